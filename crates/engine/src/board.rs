@@ -8,6 +8,10 @@ pub mod clocks;
 pub mod commands;
 pub mod live;
 mod rest;
+#[cfg(feature = "standby")]
+pub mod sheet;
+#[cfg(feature = "standby")]
+pub mod standby;
 pub mod traffic;
 
 use alloc::vec::Vec;

@@ -8,6 +8,8 @@ mod builder;
 mod clocks;
 mod declared;
 mod dictionary;
+#[cfg(feature = "standby")]
+mod digest;
 mod groups;
 mod ip;
 mod matching;
@@ -33,6 +35,8 @@ pub use crate::info::IdentityField;
 
 pub use address::ConfigAddress;
 pub use declared::{DeclaredArea, DeclaredSyncManager, SyncManagerRole};
+#[cfg(feature = "standby")]
+pub use digest::{ConfigPart, Digest};
 pub(crate) use groups::can_be_head;
 pub use groups::{Group, groups};
 pub use ip::IpSettings;

@@ -6,6 +6,8 @@ pub mod history;
 mod log;
 mod messages;
 mod notice;
+#[cfg(feature = "standby")]
+mod standby;
 mod subject;
 mod timed;
 
@@ -25,6 +27,8 @@ pub use cyclic::CyclicEvent;
 pub use log::{EventLog, EventsSince};
 pub use messages::{LogFilter, LogLevel, Message, MessageContent, MessagesSince};
 pub(crate) use notice::Notice;
+#[cfg(feature = "standby")]
+pub use standby::{CyclicStandbyEvent, StandbyEvent};
 pub use subject::{Subject, Subjects};
 pub use timed::TimedEvent;
 
@@ -478,17 +482,7 @@ pub enum Event {
         /// OR of all |0x092C| in nanoseconds: at most twice the largest.
         spread_ns: u32,
     },
-}
-
-impl Event {
-    /// Cabling positions that the event names. Positions of the scan are not included: they may differ from those of a
-    /// later rescan.
-    fn positions(&self) -> [Option<Position>; 2] {
-        match self {
-            Event::BreakLocated { cable }
-            | Event::CableErrors { cable, .. }
-            | Event::RingClosed { place: Some(cable), .. } => cable.positions(),
-            _ => [None; 2],
-        }
-    }
+    /// An event of MainDevice redundancy.
+    #[cfg(feature = "standby")]
+    Standby(StandbyEvent),
 }

@@ -19,18 +19,28 @@ pub mod domain;
 pub mod entry;
 mod evidence;
 mod flight;
+#[cfg(feature = "standby")]
+pub(crate) mod following;
 pub mod foreign;
 mod image;
 mod leaving;
+#[cfg(feature = "standby")]
+mod master_frames;
 mod missed;
 mod only_frame;
 mod outcome;
 mod place;
 mod presence;
 mod proved;
+mod ready;
 mod send_service;
 mod service;
 mod shares;
+#[cfg(not(feature = "standby"))]
+#[path = "exchange/no_standby.rs"]
+mod standby;
+#[cfg(feature = "standby")]
+mod standby;
 mod template;
 mod tries;
 mod usual;
@@ -47,6 +57,8 @@ pub use counters::CyclicCounters;
 pub use domain::Domain;
 pub use entry::Entry;
 pub use foreign::ForeignFrame;
+#[cfg(feature = "standby")]
+pub use standby::state::StandbySetup;
 
 use crate::board::Board;
 use crate::domain::{DomainId, DomainState, DomainStatus};
@@ -64,9 +76,13 @@ use flight::{CyclicFrame, Step};
 use foreign::ForeignFrames;
 use image::InputNumber;
 use leaving::{Leaving, send_twice};
-use missed::{Missed, give_up, give_up_overdue, note_missing};
+use missed::{Missed, give_up_overdue};
 use service::Service;
 use shares::Shares;
+#[cfg(not(feature = "standby"))]
+use standby::Standby;
+#[cfg(feature = "standby")]
+use standby::state::Standby;
 
 /// Id that no frame has.
 const NO_FRAME: u16 = u16::MAX;
@@ -127,6 +143,8 @@ pub struct Exchange {
     base_ns: u64,
     /// The ring is closed, as far as the ways of frames are concerned.
     is_closed: bool,
+    /// MainDevice redundancy.
+    standby: Standby,
 }
 
 impl Exchange {
@@ -177,6 +195,7 @@ impl Exchange {
             next_at: Instant::NEVER,
             base_ns: 0,
             is_closed: false,
+            standby: Standby::default(),
         };
         exchange.find_only_frame();
         exchange
@@ -224,6 +243,7 @@ impl Exchange {
             Classified::Foreign => {
                 self.tally.disturbed().foreign += 1;
                 self.foreign.keep(arrived_on, bytes);
+                self.note_foreign(arrived_on, bytes);
                 return Received::Foreign;
             }
             Classified::Other => {
@@ -233,7 +253,8 @@ impl Exchange {
         };
         let index = self.by_id[usize::from(copy.sequence.frame_id())];
         let Some(frame) = self.frames.get_mut(usize::from(index)) else {
-            return self.receive_again(copy, arrived_on, bytes);
+            let received = self.receive_master(index, copy, bytes);
+            return received.unwrap_or_else(|| self.receive_again(copy, arrived_on, bytes));
         };
         let domain = self.domains.get_mut(frame.domain());
         let image = domain.map_or_else(|| self.service.image_mut(), Domain::inputs_mut);
@@ -343,6 +364,7 @@ impl Exchange {
     #[inline(always)]
     pub fn queue(&mut self, id: DomainId, now: Instant) -> bool {
         if self.copies.is_empty()
+            && !self.standby.is_inactive()
             && let Some(domain) = self.domains.get_mut(id.0)
             && let Some(at) = domain.next_alone()
             && let Some(frame) = self.frames.get_mut(at)
@@ -358,6 +380,9 @@ impl Exchange {
     /// As [`Exchange::queue`], for any domain.
     #[inline(never)]
     fn queue_any(&mut self, id: DomainId, now: Instant) -> bool {
+        if self.standby.is_inactive() {
+            return false;
+        }
         let Some(domain) = self.domains.get_mut(id.0) else { return false };
         let set = domain.next();
         let frames = &mut self.frames[set.clone()];
@@ -379,33 +404,6 @@ impl Exchange {
         true
     }
 
-    /// Makes frames of a domain ready to be loaded. False while some are still expected.
-    fn make_ready(&mut self, id: DomainId, set: Range<usize>, now: Instant) -> bool {
-        let frames = &mut self.frames[set.clone()];
-        if frames.iter().any(|frame| frame.is_waiting() && !frame.overdue(now)) {
-            self.tally.disturbed().skipped += 1;
-            self.domains[id.0].count_skip();
-            self.events.push(CyclicEvent::Skipped { domain: id.0 as u16 }.pack());
-            return false;
-        }
-        for frame in frames.iter_mut().filter(|frame| frame.is_open()) {
-            if frame.is_waiting() {
-                give_up(frame, &mut self.missed, self.tally.disturbed());
-                self.board.post_lost(self.tally.counters.lost);
-            }
-            if frame.is_delivered() {
-                self.tally.disturbed().copies_lost += 1;
-            }
-            note_missing(frame, &self.board);
-            self.evidence.close(frame, &self.board, &mut self.events);
-        }
-        let changes = self.board.taking_part_changes();
-        if !frames.iter().all(|frame| frame.is_ready(changes)) {
-            self.follow_board(set, changes);
-        }
-        true
-    }
-
     /// Sends the queued frames, each on all links, and ends the cycle. Supervision and distributed clocks leave in each
     /// call, also where no domain is queued, unless a frame with them is still on the wire.
     #[inline(always)]
@@ -420,6 +418,10 @@ impl Exchange {
     /// As [`Exchange::send`], for any frames.
     #[inline(always)]
     fn send_any(&mut self, now: Instant, transmit: &mut impl FnMut(Link, &[u8])) {
+        if self.standby.is_inactive() {
+            return;
+        }
+        let before = self.sequence;
         self.board.traffic.post_departure(self.cycle);
         if !self.service.leaves_at_home(&self.domains) {
             self.send_service(now, transmit);
@@ -445,6 +447,7 @@ impl Exchange {
                 self.tally.counters.bytes += bytes as u64;
             }
         }
+        self.send_master_frames(before, transmit);
         self.cycle += 1;
         self.board.post_cycle(self.cycle, self.tally.counters.sent);
     }

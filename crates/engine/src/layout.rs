@@ -12,6 +12,8 @@
 mod chunk;
 mod error;
 mod fixed;
+#[cfg(feature = "standby")]
+mod master_frames;
 mod plan;
 mod repeat;
 mod service;
@@ -31,6 +33,8 @@ use fixed::Starts;
 use spec::Cut;
 
 pub use error::LayoutError;
+#[cfg(feature = "standby")]
+pub use master_frames::{InputRun, KNOWLEDGE_GRAIN, MOST_FRAGMENTS, MasterSizes, PlannedFragment, PlannedMasterFrames};
 pub use plan::{PlacedArea, PlannedDatagram, PlannedDomain, PlannedFrame, PlannedPresence};
 pub use repeat::{OutputsAgain, Piece, PlannedRepeat, RepeatRule};
 pub use spec::{AreaSpec, Delivers, DomainSpec, FixedImage, ImageOrder, LrwPolicy, Rules, Witness};
@@ -108,8 +112,14 @@ impl Layout {
     }
 
     fn check_in_flight(&self) -> Result<(), LayoutError> {
+        self.check_beside(0)
+    }
+
+    /// Whether the frames may be on the wire beside this number of others.
+    fn check_beside(&self, others: usize) -> Result<(), LayoutError> {
         let of_domain = |domain: &PlannedDomain| domain.frames.len() * usize::from(domain.under_way.max(1));
         let frames = self.domains.iter().map(of_domain).sum::<usize>() + usize::from(self.service().is_some());
+        let frames = frames + others;
         if frames > crate::ring::MAX_IN_FLIGHT { Err(LayoutError::TooManyFrames { frames }) } else { Ok(()) }
     }
 

@@ -16,12 +16,18 @@ mod datagrams;
 mod declaration;
 mod declare;
 mod ethernet;
+#[cfg(feature = "standby")]
+mod follow;
 mod found;
 mod function;
 mod gateway;
 mod handover;
+#[cfg(feature = "standby")]
+mod identity;
 mod idle;
 mod image_memory;
+#[cfg(feature = "standby")]
+mod listen;
 mod live_status;
 mod loaded;
 mod lrw;
@@ -31,6 +37,8 @@ mod messages;
 mod options;
 mod pending;
 mod prepare;
+#[cfg(feature = "standby")]
+mod redundancy;
 mod register_error;
 mod registered;
 mod registered_area;
@@ -41,9 +49,15 @@ mod scanning;
 mod sent_once;
 mod services;
 pub mod snapshot;
+#[cfg(feature = "standby")]
+mod standby;
+#[cfg(feature = "standby")]
+mod standby_options;
 mod state_of_all;
 mod states;
 mod steps;
+#[cfg(feature = "standby")]
+mod take_over;
 mod tool;
 mod working_counters;
 
@@ -65,12 +79,16 @@ pub use declaration::{Declaration, DeclaredGroup, DomainConfig, DomainMember, Ex
 pub use ethernet::EthernetSubDevice;
 pub use found::DeclaredSubDevice;
 pub use image_memory::ImageMemory;
+#[cfg(feature = "standby")]
+pub use listen::Heard;
 pub use live_status::{LiveStatus, LostCopies, SegmentStatus, SubDeviceStatus, WkcShare};
 pub use options::Options;
 pub use pending::Pending;
 pub use register_error::RegisterError;
 pub use registered_area::{EntryPlace, RegisteredArea};
 pub use sent_once::SentOnce;
+#[cfg(feature = "standby")]
+pub use standby_options::StandbyOptions;
 pub use states::{GroupState, SubDeviceState};
 
 pub use crate::declared::{Address, GroupId, SubDeviceId};
@@ -97,6 +115,7 @@ use crate::procedures::undeclared::UndeclaredMailboxes;
 use crate::queue::Consumer;
 use crate::ring::Identity;
 use crate::ring_status::{CableReport, LinkStatus, Redundancy, RingStatus};
+use crate::role::RoleControl;
 use crate::segment::member::Phase;
 use crate::segment::{Choices, Observation, Segment, counts};
 use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor, UnderWay};
@@ -147,6 +166,12 @@ pub struct MainDevice {
     disconnected: Option<Link>,
     /// Mailboxes that were in use when the role became INACTIVE.
     left_mailboxes: Vec<(InUse, KnownMailbox)>,
+    /// Its role.
+    roles: RoleControl,
+    /// Changes of the role that this half has followed.
+    role_followed: u32,
+    #[cfg(feature = "standby")]
+    standby: Option<standby::Standby>,
 }
 
 impl MainDevice {
@@ -155,6 +180,8 @@ impl MainDevice {
         let identity = Identity::new(options.codec, options.main, options.redundant);
         let mut supervisor = supervisor(identity, &options, now);
         supervisor.set_events(EventLog::new(now.0));
+        let roles = RoleControl::new(options.first_role());
+        supervisor.attach_role(roles.clone());
         let cache = SiiCache::new(options.sii_cache);
         let emergencies: Rc<RefCell<EmergencyRings>> = Rc::default();
         let undeclared = UndeclaredMailboxes::new(&supervisor.bus(), emergencies.clone());
@@ -182,6 +209,10 @@ impl MainDevice {
             own_objects: OwnObjects::default(),
             disconnected: None,
             left_mailboxes: Vec::new(),
+            roles,
+            role_followed: 0,
+            #[cfg(feature = "standby")]
+            standby: options.standby.map(standby::Standby::new),
             options,
         };
         main_device.start_reconciler();
@@ -218,13 +249,7 @@ impl MainDevice {
         self.segment.observe_written_pdos();
         self.number_cyclic_events(now);
         let events = self.supervisor.take_events().end_session();
-        let (role, are_reported) = (self.role(), self.supervisor.bus().are_commands_reported());
-        let sequence = self.supervisor.sequence();
-        self.supervisor = supervisor(self.identity, &self.options, now);
-        self.supervisor.set_role(role);
-        self.supervisor.set_command_reports(are_reported);
-        self.supervisor.go_on_from(sequence);
-        self.supervisor.set_events(events);
+        self.renew_supervisor(events, now);
         // The procedure that would have enabled it again has ended.
         self.supervisor.order_link(self.disconnected.take());
         self.segment = self.segment.without_application(&self.supervisor.bus());
@@ -277,7 +302,11 @@ impl MainDevice {
             let Some(words) = cyclic.pop() else { return };
             let lost = cyclic.dropped();
             if let Some(event) = CyclicEvent::unpack(words) {
-                self.supervisor.append_event(now, event.event(), lost - self.cyclic_events_lost);
+                #[cfg(feature = "standby")]
+                let event = standby::named(&self.standby, event);
+                #[cfg(not(feature = "standby"))]
+                let event = event.event();
+                self.supervisor.append_event(now, event, lost - self.cyclic_events_lost);
                 self.cyclic_events_lost = lost;
             }
         }
@@ -339,6 +368,8 @@ impl MainDevice {
     /// Runs procedures whose replies, deadlines or signals have arrived.
     pub fn poll(&mut self, now: Instant) {
         self.supervisor.poll(now);
+        #[cfg(feature = "standby")]
+        self.follow_role(now);
     }
 
     /// Sends acyclic frames within a byte budget; see [`Supervisor::transmit`].
@@ -407,6 +438,10 @@ impl MainDevice {
             Some(segment) => segment.view().ring_status(),
             None => RingStatus { state: self.ring(), ..self.first_ring_status() },
         };
+        if self.role() == MainDeviceRole::Inactive {
+            // What the ACTIVE has sent last.
+            status.state = self.ring();
+        }
         let seen = self.segment.board.supervision().map(|(_, seen)| seen).unwrap_or_default();
         let carriers = self.supervisor.bus().carriers();
         let positions = status.place.map_or([None; 2], |cable| cable.positions());
@@ -440,7 +475,8 @@ impl MainDevice {
 
 fn choices(options: &Options) -> Choices {
     Choices {
-        enhanced_line_crossed: options.enhanced_line_crossed,
+        // A link that is taken down looks like a MainDevice that fails (protocol 9.16).
+        enhanced_line_crossed: options.enhanced_line_crossed && options.first_role() == MainDeviceRole::Active,
         junctions: options.junctions,
         idle_operation: options.idle_operation,
         supervision: options.supervision,

@@ -22,6 +22,8 @@ pub(crate) mod junction;
 mod latch;
 pub(crate) mod loops;
 pub mod mail_watch;
+#[cfg(feature = "standby")]
+pub(crate) mod mirror;
 pub(crate) mod own_objects;
 mod presence;
 mod read_again;

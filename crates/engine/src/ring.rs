@@ -14,6 +14,8 @@ pub mod monitor;
 
 pub use frame_limit::{FrameLimit, MIN_DATAGRAMS_PER_FRAME};
 pub use identity::{Class, Classified, FrameCopy, Identity, Sequence};
+#[cfg(feature = "standby")]
+pub(crate) use identity::{foreign_frame, is_forwarded};
 pub use merge::MergeRule;
 pub use monitor::{Arrivals, RingMonitor, RingState};
 

@@ -5,7 +5,15 @@
 //! and the mailbox where a conversation begins. A further phase is a further column of `Row`, a further role a
 //! further arm of [`Function::permission`]: each function needs an entry then, because neither has a default.
 
+mod control;
+#[cfg(feature = "standby")]
+mod partner;
+
 use core::fmt;
+
+pub use control::{RoleCause, RoleControl, RoleRequest};
+#[cfg(feature = "standby")]
+pub use partner::Partner;
 
 /// What the MainDevice does as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,7 +27,7 @@ pub enum MainDevicePhase {
     Operation,
 }
 
-/// MainDeviceRole of the MainDevice on its segment (protocol 9.11).
+/// Role of the MainDevice on its segment (protocol 9.6, 9.11).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum MainDeviceRole {
@@ -111,6 +119,8 @@ functions! {
     SiiCompletion,
     /// A declaration is activated.
     Activate,
+    /// A declaration that follows the ACTIVE MainDevice; in role INACTIVE only.
+    Follow,
     /// The application ends, the scan is kept.
     Deactivate,
     /// All SubDevices are stopped.
@@ -143,6 +153,8 @@ pub enum Permission {
 pub enum Denial {
     /// It needs the bus, which another MainDevice controls.
     NeedsTheBus,
+    /// It needs another MainDevice that controls the bus.
+    NothingToFollow,
     /// An application is active.
     InOperation,
     /// No application is active.
@@ -166,6 +178,7 @@ impl fmt::Display for NotPermitted {
         let NotPermitted { function, role, denial } = self;
         let reason = match denial {
             Denial::NeedsTheBus => "it needs the bus, which another MainDevice controls",
+            Denial::NothingToFollow => "this MainDevice controls the bus itself",
             Denial::InOperation => "an application is active",
             Denial::WithoutApplication => "no application is active",
         };
@@ -193,7 +206,7 @@ impl Function {
             F::Registers | F::Eeprom | F::EepromOwner | F::Scan | F::Rescan | F::ForceTopologyChange => true,
             F::PortState | F::BlockedPorts | F::ControllerReset | F::PortReport | F::Statistics => true,
             F::SiiCompletion | F::Activate | F::Deactivate | F::Stop | F::SubDeviceInfo => true,
-            F::Status | F::OwnObjects | F::Events | F::Settings => false,
+            F::Status | F::OwnObjects | F::Events | F::Settings | F::Follow => false,
         }
     }
 
@@ -210,7 +223,7 @@ impl Function {
             F::Registers | F::Eeprom | F::EepromOwner | F::PortState | F::ControllerReset | F::PortReport => ALWAYS,
             F::SiiCompletion | F::Rescan | F::Stop | F::SubDeviceInfo => ALWAYS,
             F::Status | F::OwnObjects | F::Events | F::Settings => ALWAYS,
-            F::Scan | F::Activate => WITHOUT,
+            F::Scan | F::Activate | F::Follow => WITHOUT,
             F::ForceTopologyChange | F::BlockedPorts | F::Statistics | F::Deactivate => ACTIVE,
         }
     }
@@ -220,6 +233,7 @@ impl Function {
         let Row { orphaned, idle, operation } = self.row();
         match (role, phase) {
             (MainDeviceRole::Inactive, _) if self.needs_the_bus() => Permission::Refused,
+            (MainDeviceRole::Active, _) if matches!(self, Function::Follow) => Permission::Refused,
             (MainDeviceRole::Active | MainDeviceRole::Inactive, MainDevicePhase::Orphaned) => orphaned,
             (MainDeviceRole::Active | MainDeviceRole::Inactive, MainDevicePhase::Idle) => idle,
             (MainDeviceRole::Active | MainDeviceRole::Inactive, MainDevicePhase::Operation) => operation,
@@ -234,6 +248,9 @@ impl Function {
         match role {
             MainDeviceRole::Inactive if self.needs_the_bus() => {
                 Err(NotPermitted { function: self, role, denial: Denial::NeedsTheBus })
+            }
+            MainDeviceRole::Active if self == Function::Follow => {
+                Err(NotPermitted { function: self, role, denial: Denial::NothingToFollow })
             }
             MainDeviceRole::Active | MainDeviceRole::Inactive => Ok(()),
         }

@@ -68,6 +68,8 @@ pub use key::SubDeviceKey;
 
 pub use local_rings::is_down;
 pub use model::{Declared, Segment};
+#[cfg(feature = "standby")]
+pub use observation::StandbyObservation;
 pub use observation::{MemberFinding, Observation, Problem, ProcessDataStep};
 pub use owners::Owners;
 pub use pdo_finding::PdoFinding;

@@ -50,7 +50,7 @@ use crate::board::Board;
 use crate::event::{Event, EventLog, EventsSince, TimedEvent};
 use crate::link::{Link, LinkSet};
 use crate::ring::{Class, Classified, Identity, RingMonitor, RingState, Sequence};
-use crate::role::MainDeviceRole;
+use crate::role::{MainDeviceRole, RoleControl};
 use crate::time::Instant;
 use link_order::LinkOrder;
 use shared::Shared;
@@ -107,13 +107,8 @@ impl Supervisor {
         self.shared.borrow_mut().bell = bell;
     }
 
-    /// MainDeviceRole of the MainDevice.
-    pub fn role(&self) -> MainDeviceRole {
-        self.shared.borrow().role
-    }
-
-    /// Sets the role of the MainDevice.
-    pub fn set_role(&mut self, role: MainDeviceRole) {
+    /// Attaches the role of the MainDevice: as INACTIVE nothing is sent.
+    pub(crate) fn attach_role(&mut self, role: RoleControl) {
         self.shared.borrow_mut().role = role;
     }
 
@@ -173,7 +168,11 @@ impl Supervisor {
     pub fn transmit(&mut self, now: Instant, budget: usize, transmit: &mut impl FnMut(Link, &[u8])) -> usize {
         let shared = &mut *self.shared.borrow_mut();
         shared.now = now;
-        shared.transmit(budget, transmit)
+        match shared.role.role() {
+            MainDeviceRole::Active => shared.transmit(budget, transmit),
+            // The cyclic half has just changed the role: procedures end with the next poll.
+            MainDeviceRole::Inactive => 0,
+        }
     }
 
     /// Latest time at which [`Supervisor::poll`] has work to do, received frames aside.

@@ -47,6 +47,9 @@ const INFORMATION: [(&str, &[Function]); 2] =
 /// Independent of the role, or with another behaviour.
 const FREE: [Function; 4] = [Function::Status, Function::OwnObjects, Function::Events, Function::Settings];
 
+/// For an INACTIVE alone: it sends nothing.
+const OF_INACTIVE: Function = Function::Follow;
+
 /// Names of the groups in the sheet, in its order.
 fn groups() -> Vec<String> {
     let begin = sheet().find("Blocked at INACTIVE (groups").expect("the list of the sheet");
@@ -67,7 +70,7 @@ fn each_group_of_the_sheet_has_its_functions_and_each_function_its_group() {
     for function in Function::ALL {
         let is_blocked = BLOCKED.iter().chain(&INFORMATION).any(|(_, functions)| functions.contains(function));
         assert_eq!(is_blocked, function.needs_the_bus(), "{function:?}");
-        assert_eq!(!is_blocked, FREE.contains(function), "{function:?}");
+        assert_eq!(!is_blocked, FREE.contains(function) || *function == OF_INACTIVE, "{function:?}");
     }
 }
 
@@ -86,7 +89,7 @@ fn functions_without_the_bus_are_never_refused() {
 // covers: 9.11
 #[test]
 fn role_inactive_refuses_what_needs_the_bus_and_names_function_role_and_reason() {
-    for function in Function::ALL.iter().copied() {
+    for function in Function::ALL.iter().copied().filter(|function| *function != OF_INACTIVE) {
         for phase in [MainDevicePhase::Orphaned, MainDevicePhase::Idle, MainDevicePhase::Operation] {
             let is_refused = function.permission(MainDeviceRole::Inactive, phase) == Permission::Refused;
             let is_refused_if_active = function.permission(MainDeviceRole::Active, phase) == Permission::Refused;
@@ -102,4 +105,17 @@ fn role_inactive_refuses_what_needs_the_bus_and_names_function_role_and_reason()
             }
         }
     }
+}
+
+// covers: 9.11, standby
+#[test]
+fn only_an_inactive_without_an_application_may_follow() {
+    for phase in [MainDevicePhase::Orphaned, MainDevicePhase::Idle, MainDevicePhase::Operation] {
+        let denied = OF_INACTIVE.check(MainDeviceRole::Active, phase).unwrap_err();
+        assert_eq!(denied.denial, Denial::NothingToFollow, "{phase:?}");
+        assert_eq!(OF_INACTIVE.permission(MainDeviceRole::Active, phase), Permission::Refused);
+    }
+    assert_eq!(OF_INACTIVE.check(MainDeviceRole::Inactive, MainDevicePhase::Idle), Ok(()));
+    let denied = OF_INACTIVE.check(MainDeviceRole::Inactive, MainDevicePhase::Operation).unwrap_err();
+    assert_eq!(denied.denial, Denial::InOperation);
 }

@@ -40,7 +40,7 @@ const EVALUATIONS: [&str; 3] = ["segment/attention.rs", "segment/idle.rs", "segm
 const TABLE: &str = "<!-- pauses for another part of the engine -->";
 
 /// By file or directory, each pause in its order.
-const WAITS: [(&str, &[Reason]); 41] = [
+const WAITS: [(&str, &[Reason]); 42] = [
     ("mail/foe.rs", &[Retry]),
     ("mail/reader.rs", &[Register]),
     ("mail/voe.rs", &[Register]),
@@ -64,6 +64,7 @@ const WAITS: [(&str, &[Reason]); 41] = [
     ("procedures/junction/refute.rs", &[Retry]),
     ("procedures/loops.rs", &[Register]),
     ("procedures/mail_watch.rs", &[Cyclic]),
+    ("procedures/mirror.rs", &[Cyclic]),
     ("procedures/presence.rs", &[Register]),
     ("procedures/recover.rs", &[Retry, Retry]),
     ("procedures/resume.rs", &[Retry]),

@@ -1,9 +1,15 @@
-//! An INACTIVE MainDevice in the ring of an ACTIVE one: store-and-forward (protocol 9.7).
+//! Two MainDevices in one ring: store-and-forward of the INACTIVE (protocol 9.7), and the types of roles and takeover
+//! (protocol 9.6 to 9.10).
 //!
 //! The ring leads through both MainDevices: from the main link of the ACTIVE through the SubDevices into the redundant
 //! link of the INACTIVE, and from its main link to the redundant link of the ACTIVE. [`StoreAndForward`] sends each
 //! frame on at the other link, or back if that one is down, so that the ACTIVE has its ring. Frames of any MainDevice
 //! that leaves two bits of its source address to the standby are forwarded (protocol 9.7.1).
+//!
+//! An INACTIVE that follows, takes over and hands its role over is an [`Engine`](crate::Engine) with
+//! [`EngineOptions::standby`], and the [`Exchange`](crate::Exchange) of its application. The application drives both,
+//! and a [`Forwarder`], as `docs/standby.md` describes; the threads and the cycles of
+//! [`MainDevice`](crate::MainDevice) do not do this yet.
 
 #[cfg(feature = "packet")]
 pub mod guard;
@@ -12,10 +18,16 @@ use std::error::Error;
 use std::fmt;
 use std::time::Duration;
 
+pub use ringcat_engine::event::StandbyEvent;
+pub use ringcat_engine::layout::MasterSizes;
 use ringcat_engine::link::Link;
+pub use ringcat_engine::main_device::{Active, Heard, Options as EngineOptions, StandbyOptions};
+pub use ringcat_engine::role::{Partner, RoleCause, RoleControl, RoleRequest};
 pub use ringcat_engine::standby::{Forwarder, NotForwarded, Onward};
 use ringcat_engine::time::Instant;
+pub use ringcat_engine::{Class, class_of};
 use ringcat_wire::frame::MacAddress;
+pub use ringcat_wire::master_frame::{NotReady, Stage};
 
 use crate::links::{Arrived, Links, PerLink, SendOn};
 

@@ -7,6 +7,8 @@ mod messages;
 mod names;
 mod ring;
 mod scan;
+#[cfg(feature = "standby")]
+mod standby;
 mod subdevices;
 
 use ringcat_engine::domain::DomainState;
@@ -14,17 +16,11 @@ use ringcat_engine::event::{Event, TimedEvent};
 use ringcat_wire::frame::MacAddress;
 
 pub use messages::message;
-pub use names::Names;
+pub use names::{Names, address};
 
 /// The source address of a frame, if it is long enough to have one.
 pub fn address_of_sender(frame: &[u8]) -> Option<MacAddress> {
     frame.get(6..12)?.try_into().ok().map(MacAddress)
-}
-
-/// A MAC address in the usual notation: `02:00:00:00:00:01`.
-pub fn address(mac: MacAddress) -> String {
-    let bytes = mac.0.map(|byte| format!("{byte:02x}"));
-    bytes.join(":")
 }
 
 /// An event in one line.
@@ -37,6 +33,8 @@ pub fn describe(timed: &TimedEvent, names: &Names) -> String {
         .or_else(|| clocks::describe(event, names, *occupants))
         .or_else(|| messages::of_command(event, names, *occupants))
         .or_else(|| of_process_data(event));
+    #[cfg(feature = "standby")]
+    let line = line.or_else(|| standby::describe(event));
     // Every known event has a line; a newer engine may report others.
     line.unwrap_or_else(|| format!("{event:?}"))
 }

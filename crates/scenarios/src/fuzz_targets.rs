@@ -1,6 +1,6 @@
 //! Fuzz targets for arbitrary bytes: one per mailbox decoder (protocol 6, 10.1), and one each for ENI, ESI
-//! and network files (protocol 8, 12), for knowledge of a segment (decision 0061), and for messages of the
-//! daemon (decision 0074).
+//! and network files (protocol 8, 12), for knowledge of a segment (decision 0061), for messages of the daemon (decision
+//! 0074), and for master frames (decision 0130).
 //!
 //! A target is a plain function. It panics if a decoder panics, or if a decoded value changes when it is encoded and
 //! decoded again. `fuzz/` runs the targets under cargo-fuzz, `cargo test` with the corpora in `fuzz/corpus` and mutants
@@ -10,6 +10,7 @@ pub mod control;
 pub mod eni;
 pub mod esi;
 pub mod knowledge;
+pub mod master_frame;
 pub mod network;
 pub mod seeds;
 
@@ -31,7 +32,7 @@ use crate::dice::Dice;
 pub type Target = fn(&[u8]);
 
 /// All targets by the names of their corpora.
-pub const TARGETS: [(&str, Target); 18] = [
+pub const TARGETS: [(&str, Target); 19] = [
     ("mailbox", mailbox),
     ("error_reply", error_reply),
     ("coe", coe),
@@ -50,6 +51,7 @@ pub const TARGETS: [(&str, Target); 18] = [
     ("network", network::target),
     ("knowledge", knowledge::target),
     ("control", control::target),
+    ("master_frame", master_frame::target),
 ];
 
 /// Buffer size for any message: more than a mailbox, and the largest prefix of an encoder.

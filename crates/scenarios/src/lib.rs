@@ -43,6 +43,7 @@ pub mod tampered_links;
 pub mod tap;
 pub mod terminals;
 pub mod truth;
+pub mod two;
 pub mod uploads;
 pub mod witness;
 pub mod world;

@@ -43,13 +43,14 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("plan", &["order", "info", "topology", "config"]),
     ("layout", &["order", "declared", "link", "ring", "direction", "domain"]),
     // what happened
-    ("event", &["declared", "time", "link", "queue", "ring", "domain", "info", "topology", "ring_status", "clocks"]),
+    ("event", &["declared", "time", "link", "queue", "ring", "domain", "info", "topology", "ring_status", "clocks",
+        "role"]),
     // what is known of the segment, and what follows from what is seen
     ("segment", &["order", "declared", "time", "link", "ring", "board", "info", "topology", "ring_status", "config",
         "clocks", "plan", "layout", "event", "junction"]),
     // cyclic half
-    ("exchange", &["order", "declared", "time", "link", "queue", "domain", "ring", "board", "clocks", "layout",
-        "event"]),
+    ("exchange", &["order", "direction", "declared", "time", "link", "queue", "domain", "role", "ring", "board",
+        "clocks", "layout", "event"]),
     // acyclic half
     ("supervisor", &["time", "bell", "link", "queue", "ring", "board", "event", "role"]),
     ("mail", &["declared", "time", "config", "event", "knowledge", "supervisor", "role"]),

@@ -27,7 +27,9 @@ const NAMES: [&str; 8] = ["Error", "Failure", "Problem", "Warning", "Event", "Co
 const EXEMPT: &[(&str, &str)] = &[
     ("Address", "an index in the declaration or a position on the bus"),
     ("Cable", "a cable has two ends"),
+    ("Class", "cyclic or acyclic"),
     ("CyclicEvent", "between the halves of the engine"),
+    ("CyclicStandbyEvent", "between the halves of the engine"),
     ("Direction", "outputs or inputs"),
     ("DomainState", "the three results of a working counter"),
     ("EitherLinks", "the two kinds that it is made of"),

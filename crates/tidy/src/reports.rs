@@ -19,7 +19,7 @@ const NOTICES: &str = "crates/engine/src/event/notice.rs";
 const PAGE: (&str, &str) = ("docs/ARCHITECTURE.md", "<!-- notices of the engine -->");
 
 /// Files of the acyclic half that start procedures, each with its reason.
-const STARTS: [(&str, &str); 15] = [
+const STARTS: [(&str, &str); 16] = [
     ("crates/engine/src/procedures/reconcile.rs", "starts what the model requests"),
     ("crates/engine/src/procedures/serve_requests.rs", "one procedure per request of the cyclic thread"),
     ("crates/engine/src/procedures/own_objects/detection.rs", "a detection that a gateway's client orders"),
@@ -29,6 +29,7 @@ const STARTS: [(&str, &str); 15] = [
     ("crates/engine/src/mail/relay/gateway_queue.rs", "one procedure per message of a gateway's client"),
     ("crates/engine/src/main_device/activate.rs", "the reconciler of an application"),
     ("crates/engine/src/main_device/idle.rs", "a call of the application: deactivation"),
+    ("crates/engine/src/main_device/follow.rs", "a call of the application: the model shows states of the ACTIVE"),
     ("crates/engine/src/main_device/handover.rs", "a call of the application: going on with known SubDevices"),
     ("crates/engine/src/main_device/pending.rs", "services that the application calls"),
     ("crates/engine/src/main_device/scanning.rs", "a call of the application: a scan"),

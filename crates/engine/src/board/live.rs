@@ -133,6 +133,14 @@ impl LiveWords {
         words.life.store(life.pack(), Ordering::Relaxed);
     }
 
+    /// Posts presence and AL status of a SubDevice as another MainDevice sees it.
+    #[cfg(feature = "standby")]
+    pub(crate) fn post_life(&self, subdevice: usize, life: Life) {
+        if let Some(words) = self.subdevices.get(subdevice) {
+            words.life.store(life.pack(), Ordering::Relaxed);
+        }
+    }
+
     /// Posts an AL status that was read at a station address. Addresses of SubDevices without a declaration are
     /// ignored.
     pub(crate) fn post_al_status(&self, station: StationAddress, status: AlStatus, code: AlStatusCode) {

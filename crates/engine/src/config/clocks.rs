@@ -62,7 +62,7 @@ pub enum WhenUnlocked {
 }
 
 /// Distributed clocks of the segment.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub struct ClockConfig {
     /// The reference clock that all other clocks follow. When it is lost, the next SubDevice with a clock takes over.

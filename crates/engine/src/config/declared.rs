@@ -33,7 +33,7 @@ impl SyncManagerRole {
 
 /// A SyncManager from a configuration file. Its registers are written as given; PDO assignment and mapping are part of
 /// the start-up commands of the file.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub struct DeclaredSyncManager {
     /// Its number.

@@ -17,7 +17,7 @@ pub struct PdoEntry {
 }
 
 /// A PDO and its mapping.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub struct PdoMapping {
     /// Index of the PDO mapping object.
@@ -35,7 +35,7 @@ pub(crate) const fn is_of_pdos(index: u16) -> bool {
 }
 
 /// The PDOs of one SyncManager.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub struct PdoAssignment {
     /// The SyncManager.

@@ -8,7 +8,7 @@ use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::datagram::MAX_DATA;
 
 /// Action of a command on a register.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum RegisterAccess {
     /// Writes data.
     Write(Vec<u8>),
@@ -24,7 +24,7 @@ pub enum RegisterAccess {
 }
 
 /// A command to a register of one SubDevice.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub struct RegisterCommand {
     /// Address of the first register.

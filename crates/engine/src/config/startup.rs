@@ -57,7 +57,7 @@ impl fmt::Display for Transition {
 }
 
 /// An SDO download.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub struct SdoDownload {
     /// Index of the object.
@@ -85,7 +85,7 @@ impl SdoDownload {
 }
 
 /// An SDO upload.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub struct SdoUpload {
     /// Index of the object.
@@ -121,7 +121,7 @@ impl SdoUpload {
 }
 
 /// A write of an IDN's value.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub struct IdnWrite {
     /// Drive of the SubDevice, 0..=7.
@@ -140,7 +140,7 @@ impl IdnWrite {
 }
 
 /// Action of a start-up command.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum StartupAction {
     /// SDO download.
@@ -156,7 +156,7 @@ pub enum StartupAction {
 }
 
 /// A start-up command.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub struct StartupCommand {
     /// The transition.

@@ -5,7 +5,7 @@ use core::time::Duration;
 use ringcat_wire::al::AlState;
 
 /// Time limits (protocol 5.4).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub struct Timeouts {
     /// INIT to PREOP or BOOT.
@@ -110,7 +110,7 @@ impl Timeouts {
 }
 
 /// The limit of one state change, if it differs from [`Timeouts`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub struct StateTimeout {
     /// State before.

@@ -1,6 +1,11 @@
 //! Events of the exchange, which reach the acyclic half as words in a queue.
 
+#[cfg(feature = "standby")]
+use alloc::format;
+
 use super::Event;
+#[cfg(feature = "standby")]
+use super::standby::CyclicStandbyEvent;
 use crate::domain::{DomainId, DomainState, DomainStatus};
 use crate::queue::WORDS;
 
@@ -28,6 +33,9 @@ pub enum CyclicEvent {
         /// OR of all magnitudes in nanoseconds.
         spread_ns: u32,
     },
+    /// An event of MainDevice redundancy.
+    #[cfg(feature = "standby")]
+    Standby(CyclicStandbyEvent),
 }
 
 const KIND_DOMAIN: u64 = 1;
@@ -59,6 +67,8 @@ impl CyclicEvent {
             CyclicEvent::SyncWindow { inside, spread_ns } => {
                 [KIND_SYNC_WINDOW | (inside as u64) << 8, spread_ns as u64, 0]
             }
+            #[cfg(feature = "standby")]
+            CyclicEvent::Standby(event) => event.pack(),
         }
     }
 
@@ -87,6 +97,12 @@ impl CyclicEvent {
             KIND_SYNC_WINDOW => {
                 Some(CyclicEvent::SyncWindow { inside: words[0] >> 8 & 1 != 0, spread_ns: words[1] as u32 })
             }
+            #[cfg(feature = "standby")]
+            _ => match CyclicStandbyEvent::unpack(words) {
+                Some(event) => Some(CyclicEvent::Standby(event)),
+                None => None,
+            },
+            #[cfg(not(feature = "standby"))]
             _ => None,
         }
     }
@@ -99,6 +115,8 @@ impl CyclicEvent {
             }
             CyclicEvent::Skipped { domain } => Event::Skipped { domain: DomainId(domain.into()) },
             CyclicEvent::SyncWindow { inside, spread_ns } => Event::SyncWindow { inside, spread_ns },
+            #[cfg(feature = "standby")]
+            CyclicEvent::Standby(event) => Event::Standby(event.event(|number| format!("item {number}"))),
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Subjects of events, and sets of them: what a client of events asks for.
 
+use ringcat_wire::address::Position;
+
 use super::Event;
 
 /// Subject of an event.
@@ -108,6 +110,8 @@ impl Event {
             Event::LinkDown { .. } | Event::LinkUp { .. } | Event::ForeignFrame { .. } | Event::FrameLimit { .. } => {
                 Subject::Links
             }
+            #[cfg(feature = "standby")]
+            Event::Standby(_) => Subject::Links,
             Event::UndeclaredFailed { .. }
             | Event::UndeclaredState { .. }
             | Event::StateReached { .. }
@@ -130,6 +134,19 @@ impl Event {
             | Event::WentOnUnlocked { .. }
             | Event::ApplicationTime { .. }
             | Event::SyncWindow { .. } => Subject::Clocks,
+        }
+    }
+}
+
+impl Event {
+    /// Cabling positions that the event names. Positions of the scan are not included: they may differ from those of a
+    /// later rescan.
+    pub(super) fn positions(&self) -> [Option<Position>; 2] {
+        match self {
+            Event::BreakLocated { cable }
+            | Event::CableErrors { cable, .. }
+            | Event::RingClosed { place: Some(cable), .. } => cable.positions(),
+            _ => [None; 2],
         }
     }
 }

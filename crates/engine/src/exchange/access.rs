@@ -143,7 +143,8 @@ impl Exchange {
 
     /// Whether copies of frames may still come back, including second copies of frames whose inputs are delivered.
     pub fn awaits_copies(&self) -> bool {
-        self.decide_at != Instant::NEVER || self.frames.iter().any(|frame| frame.is_waiting() || frame.is_delivered())
+        let is_open = |frame: &CyclicFrame| frame.is_waiting() || frame.is_delivered();
+        self.decide_at != Instant::NEVER || self.frames.iter().any(is_open) || self.standby.awaits_copies()
     }
 
     /// Cycles that begin earlier than this disturb a measurement of propagation delays that found no time without

@@ -9,6 +9,8 @@ use core::ops::Range;
 use core::time::Duration;
 
 use super::flight::CyclicFrame;
+#[cfg(feature = "standby")]
+use super::image::Moment;
 use super::image::{Image, InputNumber};
 use crate::domain::{DomainState, DomainStatus, Freshness};
 use crate::layout::PlannedDomain;
@@ -365,6 +367,22 @@ impl Domain {
             0 => Freshness::Never,
             left if left >= self.evaluated => Freshness::Fresh,
             left => Freshness::Stale { cycles: self.evaluated - left },
+        }
+    }
+}
+
+#[cfg(feature = "standby")]
+impl Domain {
+    /// Another MainDevice exchanges the domain: its state there in the cycle that is sent as number `left` minus one
+    /// here, and the SubDevices whose inputs in the image are those of this cycle.
+    pub(crate) fn follow(&mut self, status: DomainStatus, left: u64, is_fresh: impl Fn(usize) -> bool) {
+        self.status = DomainStatus { skipped: self.status.skipped, ..status };
+        self.image.set_complete(false);
+        self.evaluated = left;
+        (self.out, self.unsent, self.interruption) = (0, false, 0);
+        let fresh = self.members.iter().filter(|member| is_fresh(member.subdevice));
+        for input in fresh.flat_map(|member| &member.inputs) {
+            self.image.note_moment(*input, Moment { left, came: left });
         }
     }
 }

@@ -121,6 +121,12 @@ impl Image {
         moments.into_iter().chain(shared.map(|share| share.moment)).max_by_key(|moment| moment.left).unwrap_or_default()
     }
 
+    /// Inputs have arrived by another way than a frame of this MainDevice.
+    #[cfg(feature = "standby")]
+    pub fn note_moment(&mut self, input: InputNumber, moment: Moment) {
+        self.parts.get_mut(input.part).into_iter().for_each(|part| *part = moment);
+    }
+
     /// Inputs of a share, by its number, arrived again. False where the last copies on this link brought another
     /// selection.
     #[inline]

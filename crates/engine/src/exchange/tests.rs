@@ -2,6 +2,8 @@
 
 mod answers;
 mod parts;
+#[cfg(feature = "standby")]
+mod standby;
 mod under_way;
 
 use core::time::Duration;

@@ -10,6 +10,7 @@ use super::activate_error::ActivateError;
 use super::active::Active;
 use super::areas::{Areas, Directory};
 use super::declaration::Declaration;
+use super::live_status::LiveStatus;
 use super::loaded::Loaded;
 use super::lrw::{self, check_lrw};
 use super::prepare::{
@@ -37,8 +38,12 @@ use crate::topology::Topology;
 const CYCLIC_EVENTS: usize = 1024;
 
 impl MainDevice {
-    /// Starts a loaded declaration.
-    pub(super) fn start_loaded(&mut self, loaded: Loaded) -> Result<Active, ActivateError> {
+    /// Lays out process data of a loaded declaration in a session, and creates both halves. No procedure begins.
+    pub(super) fn prepare_loaded(
+        &mut self,
+        loaded: Loaded,
+        session: u32,
+    ) -> Result<(Active, SharedSegment), ActivateError> {
         let scan = self.found_to_begin().ok_or(ActivateError::NoScan)?;
         let bus = self.supervisor.bus();
         let declaration = with_domain(loaded.declaration.clone());
@@ -48,7 +53,7 @@ impl MainDevice {
         let clock_config = declaration.clocks.clone();
         let plans = plan_all(&declaration, &found)?;
         check_domains(&loaded.declaration, &plans)?;
-        let (specs, layout) = self.lay_out(&declaration, &plans, &found)?;
+        let (specs, layout) = self.lay_out(&declaration, &plans, &found, session)?;
         let repeats = repeats::of_all(&declaration.subdevices, &plans, &found);
         let sends_again: Vec<bool> = declaration.domains.iter().map(|domain| domain.sends_again).collect();
         let members = members(declaration, found, &plans, &layout)?;
@@ -57,18 +62,15 @@ impl MainDevice {
         let directory = Directory::new(&plans, &layout).with_sent_once(&repeats);
         report_oddities(&self.segment, &subdevices, &layout);
         let count = subdevices.member_count();
-        let optional = subdevices.members().map(|member| member.config.optional).collect();
-        let addresses = subdevices.members().map(|member| member.station).collect();
-        let board = Board::new(count).with_optional(optional).with_stations(addresses);
-        let board = Arc::new(board.with_commands(layout.datagrams()));
+        let board = Arc::new(board_of(&subdevices, &layout));
         let (producer, consumer) = queue(CYCLIC_EVENTS);
         let mut exchange = self.exchange(&layout, board.clone(), producer);
         let repeats = repeats::rules(&repeats);
         exchange.send_lost_frames_again(&layout, &repeats, |domain| sends_again.get(domain.0) == Some(&true));
-        if let Some(config) = &clock_config {
-            let ClockConfig { epoch, bus_shift, sync_window_ns, .. } = *config;
-            exchange.set_up_clocks(ClockSetup { epoch, bus_shift, sync_window_ns });
-        }
+        #[cfg(feature = "standby")]
+        self.set_up_standby(&mut exchange, (&loaded.declaration, &layout, session), &subdevices)
+            .map_err(ActivateError::Layout)?;
+        set_up_clocks(&mut exchange, clock_config.as_ref());
         let stations = stations_by_position(&subdevices, scan.subdevices.iter().map(|info| info.station));
         let closings = loaded.closings(&topology, &subdevices, &stations);
         let cables = cables(&topology, self.options.links());
@@ -89,11 +91,11 @@ impl MainDevice {
         segment.observe(Observation::Activated(declared));
         self.supervisor.attach(board);
         self.supervisor.attach_bell(self.requests.bell().clone());
-        self.start_procedures(segment);
         self.cyclic_events = Some(consumer);
         let periods = specs.iter().map(|spec| spec.period).collect();
         let under_way = specs.iter().map(|spec| spec.under_way).max().unwrap_or(1);
-        Ok(Active { exchange, directory, periods, under_way, live_status: self.live_status() })
+        let live_status = LiveStatus::of(&segment.board);
+        Ok((Active { exchange, directory, periods, under_way, live_status }, segment))
     }
 
     /// The domains, and the places of their process data.
@@ -102,14 +104,18 @@ impl MainDevice {
         declaration: &Declaration,
         plans: &[Areas],
         found: &[Option<Rc<SubDeviceInfo>>],
+        session: u32,
     ) -> Result<(Vec<DomainSpec>, Layout), ActivateError> {
         let links = self.options.links();
         let lrw = lrw::policy(declaration.lrw, &declaration.explicit_lrw, links)?;
         let specs = domain_specs(declaration, plans, lrw, links)?;
         check_lrw(lrw, &specs, links)?;
+        #[cfg(feature = "standby")]
+        if self.is_lrw_refused(lrw) {
+            return Err(ActivateError::LrwWithStandby);
+        }
         let witnesses = witnesses(plans, found, &specs);
         let (supervision, max_datagrams) = (self.options.supervision, self.options.most_datagrams());
-        let session = self.next_session(self.supervisor.bus().now());
         let rules = Rules { links, supervision, lrw, witnesses: &witnesses, session, max_datagrams };
         let mut layout = Layout::with(&specs, rules).map_err(ActivateError::Layout)?;
         if declaration.clocks.is_some() {
@@ -128,9 +134,14 @@ impl MainDevice {
         exchange
     }
 
+    /// Starts the procedures that the model requests.
+    pub(super) fn start_reconcile(&mut self, segment: SharedSegment) {
+        self.supervisor.spawn(reconcile(self.supervisor.bus(), segment, self.companions()));
+    }
+
     /// Starts configuration, supervision and all other procedures of an active MainDevice.
-    fn start_procedures(&mut self, segment: SharedSegment) {
-        self.supervisor.spawn(reconcile(self.supervisor.bus(), segment.clone(), self.companions()));
+    pub(super) fn start_procedures(&mut self, segment: SharedSegment) {
+        self.start_reconcile(segment.clone());
         segment.observe(Observation::Attached);
         self.statistics = Some(segment.statistics.clone());
         self.segment = segment;
@@ -138,7 +149,7 @@ impl MainDevice {
 
     /// Number of a new session: differs from the previous one, and most probably from that of a program that ran here
     /// recently.
-    fn next_session(&mut self, now: Instant) -> u32 {
+    pub(super) fn next_session(&mut self, now: Instant) -> u32 {
         /// About four seconds.
         const STEP_BITS: u32 = 32;
         self.activations = self.activations.wrapping_add(1);
@@ -153,4 +164,20 @@ fn clocks_of(config: Option<ClockConfig>, scan: &Found, topology: &Topology, sub
         Some((index, &*subdevices.member(index)?.member.config))
     };
     Clocks::new(config, &scan.subdevices, topology, member)
+}
+
+/// The board of an application.
+fn board_of(subdevices: &SubDevices, layout: &Layout) -> Board {
+    let optional = subdevices.members().map(|member| member.config.optional).collect();
+    let addresses = subdevices.members().map(|member| member.station).collect();
+    let board = Board::new(subdevices.member_count()).with_optional(optional).with_stations(addresses);
+    board.with_commands(layout.datagrams())
+}
+
+/// Sets up the clocks in the cyclic frames, if there are any.
+fn set_up_clocks(exchange: &mut Exchange, config: Option<&ClockConfig>) {
+    if let Some(config) = config {
+        let ClockConfig { epoch, bus_shift, sync_window_ns, .. } = *config;
+        exchange.set_up_clocks(ClockSetup { epoch, bus_shift, sync_window_ns });
+    }
 }

@@ -57,6 +57,9 @@ pub enum ActivateError {
         /// Index in the declaration.
         subdevice: SubDeviceId,
     },
+    /// LRW with MainDevice redundancy: the other MainDevice takes outputs from frames that have passed SubDevices.
+    #[cfg(feature = "standby")]
+    LrwWithStandby,
     /// Process data of a SubDevice was put into two domains.
     TwoDomains {
         /// Index in the declaration.
@@ -194,6 +197,10 @@ impl fmt::Display for ActivateError {
                 write!(f, "domain {domain}: expected 1 to {MAX_UNDER_WAY} cycles under way, got {under_way}")
             }
             ActivateError::LrwOnTwoLinks { .. } | ActivateError::NamedLrwOnTwoLinks(_) => self.fmt_two_links(f),
+            #[cfg(feature = "standby")]
+            ActivateError::LrwWithStandby => {
+                f.write_str("LRW is not allowed with MainDevice redundancy: declare LRD and LWR")
+            }
             ActivateError::LrwUnknown { domain, subdevice } => {
                 write!(f, "domain {domain}: LRW is configured, but declaration {subdevice} does not support it")
             }

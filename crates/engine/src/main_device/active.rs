@@ -9,6 +9,7 @@ use crate::exchange::Exchange;
 
 /// Result of the activation.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Active {
     /// The cyclic half.
     pub exchange: Exchange,

@@ -9,20 +9,25 @@ use alloc::vec::Vec;
 
 use ringcat_wire::al::AlState;
 
-use super::MainDevice;
+use super::{MainDevice, supervisor};
+use crate::event::EventLog;
 use crate::knowledge::{Handover, KnownMailbox};
 use crate::mail::InUse;
 use crate::procedures::scan::ScanError;
+#[cfg(feature = "standby")]
+use crate::role::RoleRequest;
 use crate::role::{Denial, Function, MainDeviceRole, NotPermitted};
 use crate::segment::{KeptState, Observation, UndeclaredObservation, UpkeepProgress};
+use crate::time::Instant;
 
 impl MainDevice {
     /// Its role on the segment: [`MainDeviceRole::Active`] unless it was set.
     pub fn role(&self) -> MainDeviceRole {
-        self.supervisor.role()
+        self.roles.role()
     }
 
-    /// Sets the role. It decides which functions are refused from now on.
+    /// Sets the role. It decides which functions are refused from now on. With MainDevice redundancy and an application
+    /// it takes effect with the next cycle ([`MainDevice::role_control`]), and nothing ends but what runs on the bus.
     ///
     /// INACTIVE ends all that runs: conversations, services, scans, supervision, idle operation, the application. Jobs
     /// under way end without a result, a stop or a deactivation with [`NotPermitted`], a scan with
@@ -35,18 +40,37 @@ impl MainDevice {
         if role == self.role() {
             return;
         }
+        #[cfg(feature = "standby")]
+        if self.standby.is_some() && self.active().is_some() {
+            // The cycles of the application go on in the other role.
+            return self.roles.request(match role {
+                MainDeviceRole::Active => RoleRequest::Active,
+                MainDeviceRole::Inactive => RoleRequest::Inactive,
+            });
+        }
         match role {
             MainDeviceRole::Inactive => {
                 self.end_all();
-                self.supervisor.set_role(role);
+                self.roles.set(role);
             }
             MainDeviceRole::Active => {
-                self.supervisor.set_role(role);
+                self.roles.set(role);
                 *self.scan_error.borrow_mut() = None;
                 self.go_on_with_mailboxes();
                 self.begin_idle();
             }
         }
+        self.role_followed = self.roles.changes();
+    }
+
+    /// Another supervisor, without procedures.
+    pub(super) fn renew_supervisor(&mut self, events: EventLog, now: Instant) {
+        let (are_reported, sequence) = (self.supervisor.bus().are_commands_reported(), self.supervisor.sequence());
+        self.supervisor = supervisor(self.identity, &self.options, now);
+        self.supervisor.attach_role(self.roles.clone());
+        self.supervisor.set_command_reports(are_reported);
+        self.supervisor.go_on_from(sequence);
+        self.supervisor.set_events(events);
     }
 
     /// Ends all procedures.

@@ -10,7 +10,7 @@ use crate::procedures::deactivate::{Remainder, deactivate};
 use crate::procedures::loops::restore;
 use crate::procedures::scan::ScanOptions;
 use crate::procedures::services::ServiceError;
-use crate::role::{Function, MainDevicePhase};
+use crate::role::{Function, MainDevicePhase, MainDeviceRole};
 use crate::segment::{Addressed, Found, IdleObservation, Observation, ReadPdos, Scan, UndeclaredObservation};
 use crate::time::Instant;
 
@@ -60,7 +60,8 @@ impl MainDevice {
 
     /// Starts the procedures of idle operation, if it is requested and they do not run.
     pub(super) fn begin_idle(&mut self) {
-        if !self.options.idle_operation || self.segment.view().keeps_undeclared() {
+        let is_active = self.role() == MainDeviceRole::Active;
+        if !self.options.idle_operation || !is_active || self.segment.view().keeps_undeclared() {
             return;
         }
         self.segment.observe_undeclared(UndeclaredObservation::KeepingBegun);

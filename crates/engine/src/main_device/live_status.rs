@@ -75,6 +75,11 @@ pub struct SegmentStatus {
 }
 
 impl LiveStatus {
+    /// Of an application with this board.
+    pub(super) fn of(board: &Arc<Board>) -> LiveStatus {
+        LiveStatus { board: board.clone() }
+    }
+
     /// Number of declared SubDevices.
     pub fn subdevice_count(&self) -> usize {
         self.board.live.count()

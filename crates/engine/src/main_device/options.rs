@@ -9,7 +9,11 @@ use crate::info::SiiExtent;
 use crate::junction::JunctionMode;
 use crate::link::LinkSet;
 use crate::ring::MIN_DATAGRAMS_PER_FRAME;
+use crate::role::MainDeviceRole;
 use crate::segment::{ReadPdos, Retries};
+
+#[cfg(feature = "standby")]
+use super::standby_options::StandbyOptions;
 
 /// Configuration of a MainDevice that is needed before the first frame.
 #[derive(Clone, Debug)]
@@ -54,6 +58,9 @@ pub struct Options {
     /// Maximum number of datagrams in a frame, cyclic and acyclic; `None`: as many as fit. For segments behind
     /// gateways, and simulators, with a limit (often 15). Values below [`MIN_DATAGRAMS_PER_FRAME`] are raised to it.
     pub max_datagrams_per_frame: Option<u16>,
+    /// MainDevice redundancy; `None` without. With it the MainDevice begins INACTIVE (protocol MR-01).
+    #[cfg(feature = "standby")]
+    pub standby: Option<StandbyOptions>,
 }
 
 impl Options {
@@ -75,12 +82,23 @@ impl Options {
             idle_operation: false,
             retries: Retries::Always,
             max_datagrams_per_frame: None,
+            #[cfg(feature = "standby")]
+            standby: None,
         }
     }
 
     /// Maximum number of datagrams in a frame.
     pub(super) fn most_datagrams(&self) -> Option<usize> {
         self.max_datagrams_per_frame.map(|most| usize::from(most.max(MIN_DATAGRAMS_PER_FRAME)))
+    }
+
+    /// The role in which the MainDevice begins.
+    pub(super) fn first_role(&self) -> MainDeviceRole {
+        #[cfg(feature = "standby")]
+        if self.standby.is_some() {
+            return MainDeviceRole::Inactive;
+        }
+        MainDeviceRole::Active
     }
 
     /// Dictionaries that are read of undeclared SubDevices in PREOP.

@@ -27,8 +27,13 @@ impl MainDevice {
     ///
     /// # Errors
     /// [`ActivateError::NotPermitted`], and errors in the declaration alone.
-    pub fn load(&mut self, mut declaration: Declaration) -> Result<(), ActivateError> {
+    pub fn load(&mut self, declaration: Declaration) -> Result<(), ActivateError> {
         self.permit(Function::Activate)?;
+        self.load_permitted(declaration)
+    }
+
+    /// As [`MainDevice::load`], once it is permitted.
+    pub(super) fn load_permitted(&mut self, mut declaration: Declaration) -> Result<(), ActivateError> {
         check(&declaration)?;
         self.memories = Memories::of(&mut declaration)?;
         self.loaded = Some(Loaded { declaration, connections: Vec::new() });
@@ -102,7 +107,9 @@ impl MainDevice {
     pub fn apply(&mut self) -> Result<Active, ActivateError> {
         self.permit(Function::Activate)?;
         let loaded = self.loaded.clone().ok_or(ActivateError::NotLoaded)?;
-        let active = self.start_loaded(loaded)?;
+        let session = self.next_session(self.supervisor.bus().now());
+        let (active, segment) = self.prepare_loaded(loaded, session)?;
+        self.start_procedures(segment);
         self.loaded = None;
         Ok(active)
     }

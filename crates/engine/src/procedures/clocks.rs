@@ -1,6 +1,7 @@
 //! Distributed clocks: set-up, lock, supervision (protocol 7).
 //!
 //! * `measure`: the present connections of the SubDevices, and the times of frames from clock to clock;
+//! * `adopt`: clocks that another MainDevice has set up (feature `standby`);
 //! * `set_up`: propagation delays, offsets, filters;
 //! * `offsets`: another time of the application;
 //! * `slide`: the rest of a jump of that time while SYNC signals run;
@@ -11,6 +12,8 @@
 //! They pass measured, written and read values to the model of the segment (`segment`), which contains the
 //! state of the clocks and decides the next step.
 
+#[cfg(feature = "standby")]
+mod adopt;
 mod changes;
 mod drift;
 mod measure;
@@ -21,6 +24,8 @@ mod signals;
 mod slide;
 mod watch;
 
+#[cfg(feature = "standby")]
+pub(super) use adopt::keep_adopted_clocks;
 pub(super) use drift::compensate_drift;
 pub use not_locked::NotLocked;
 pub(super) use not_locked::SignalsError;

@@ -1,6 +1,8 @@
 //! Starts the procedures that the model of the segment requests. They are started only here.
 
 use super::cabling::examine;
+#[cfg(feature = "standby")]
+use super::clocks::keep_adopted_clocks;
 use super::clocks::{compensate_drift, keep_clocks};
 use super::complete_siis::complete_in_background;
 use super::error_watch::watch_errors;
@@ -71,6 +73,8 @@ fn start_watch(which: Watch, bus: Bus, segment: SharedSegment, companions: &Comp
     let own = bus.clone();
     match which {
         Watch::Clocks => bus.spawn(keep_clocks(own, segment)),
+        #[cfg(feature = "standby")]
+        Watch::AdoptedClocks => bus.spawn(keep_adopted_clocks(own, segment)),
         Watch::Supervision => bus.spawn(supervise(own, segment)),
         Watch::Registers => bus.spawn(verify(own, segment)),
         Watch::Errors => bus.spawn(watch_errors(own, segment)),

@@ -42,7 +42,7 @@ impl Requests {
         &self.bell
     }
 
-    /// Ends the service of requests.
+    /// Fails the requests that wait or are under way.
     pub(crate) fn end(&self) {
         self.all.borrow().iter().for_each(AcyclicSide::end);
     }

@@ -59,6 +59,13 @@ impl Sequence {
         self.0
     }
 
+    /// How many frames later this number is than another one; negative if it is earlier.
+    #[cfg(feature = "standby")]
+    pub(crate) const fn since(self, other: Sequence) -> i16 {
+        // The numbers have 15 bits.
+        (self.0.wrapping_sub(other.0) << 1) as i16 >> 1
+    }
+
     /// The lower 8 bits, RedFrameId in docs/protocol.
     pub const fn frame_id(self) -> u8 {
         self.0 as u8
@@ -209,6 +216,23 @@ impl Identity {
 pub fn class_of(bytes: &[u8]) -> Option<Class> {
     let index = *bytes.get(FIRST_INDEX_AT)?;
     Some(if index & CLASS_BIT == 0 { Class::Cyclic } else { Class::Acyclic })
+}
+
+/// Whether an INACTIVE MainDevice has forwarded a received frame (protocol CF-01), whose source address begins with the
+/// marks.
+#[cfg(feature = "standby")]
+pub(crate) fn is_forwarded(bytes: &[u8]) -> bool {
+    use ringcat_wire::source_address::{FORWARDED_ON_MAIN, FORWARDED_ON_REDUNDANT};
+    bytes.get(SOURCE_AT).is_some_and(|marks| marks & (FORWARDED_ON_MAIN | FORWARDED_ON_REDUNDANT) != 0)
+}
+
+/// The sender of a frame of another MainDevice, and the sequence number of the frame, if that one writes source
+/// addresses and Idx as this library does by default. `None` if there is no first datagram.
+#[cfg(feature = "standby")]
+pub(crate) fn foreign_frame(bytes: &[u8]) -> Option<([u8; 3], Sequence)> {
+    let head = bytes.first_chunk::<{ FIRST_INDEX_AT + 1 }>()?;
+    let sender = [head[SOURCE_AT + 3], head[SOURCE_AT + 4], head[SOURCE_AT + 5]];
+    Some((sender, Sequence::from_wire(head[SOURCE_AT + 1], head[FIRST_INDEX_AT])))
 }
 
 #[cfg(test)]

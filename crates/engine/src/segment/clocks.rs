@@ -11,6 +11,8 @@ mod timeline;
 pub use life::Due;
 pub(super) use life::{Compensation, Delays, Life, Lock, Running, Unwritten};
 pub use node::Node;
+#[cfg(feature = "standby")]
+pub use observation::{AdoptedClock, AdoptedClocks};
 pub use observation::{Answer, Answers, ClockObservation, Difference, LatchedTimes};
 pub use state::Clocks;
 pub use status::{ClockStatus, HiddenDelay};

@@ -55,6 +55,9 @@ pub enum Check {
 pub enum Watch {
     /// Sets up the clocks and supervises them.
     Clocks,
+    /// Supervises clocks that another MainDevice has set up.
+    #[cfg(feature = "standby")]
+    AdoptedClocks,
     /// Passes posted words to the model.
     Supervision,
     /// Compares registers with the written values.

@@ -29,6 +29,8 @@ use super::seen::Seen;
 use super::undeclared::UndeclaredObservation;
 use super::versions::Versions;
 use super::view::View;
+#[cfg(feature = "standby")]
+use crate::board::live::Life;
 use crate::declared::Move;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
@@ -36,6 +38,23 @@ use crate::ring::FrameLimit;
 use crate::ring_status::CableErrors;
 use crate::time::Instant;
 use crate::topology::NodeStatus;
+
+/// An observation of MainDevice redundancy.
+#[cfg(feature = "standby")]
+#[derive(Debug)]
+pub enum StandbyObservation<'a> {
+    /// This MainDevice controls the bus from now on, with process data of another one.
+    TookOver {
+        /// The members as the other MainDevice has seen them.
+        lives: &'a [Life],
+        /// They keep their configuration; otherwise they get it again from INIT on.
+        is_hot: bool,
+    },
+    /// Another MainDevice controls the bus from now on: procedures have ended.
+    Yielded,
+    /// Another MainDevice controls the bus, and may have posted other states of the members.
+    Mirrored,
+}
 
 /// How a SubDevice takes part in process data from now on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -163,6 +182,9 @@ pub enum Observation<'a> {
     Attached,
     /// The application ends. The result of the scan stays.
     Deactivated,
+    /// What another MainDevice of the ring does, or has done.
+    #[cfg(feature = "standby")]
+    Standby(StandbyObservation<'a>),
 
     /// The configuration of all present members may begin.
     Started,

@@ -13,6 +13,8 @@ mod observe;
 mod pdos;
 mod ports;
 mod recabling;
+#[cfg(feature = "standby")]
+mod roles;
 mod silence;
 mod stages;
 mod unassigned;

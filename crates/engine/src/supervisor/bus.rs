@@ -73,7 +73,7 @@ impl Bus {
     /// # Errors
     /// The role of the MainDevice does not allow it.
     pub fn permit(&self, function: Function) -> Result<(), NotPermitted> {
-        function.check_role(self.shared.borrow().role)
+        function.check_role(self.shared.borrow().role.role())
     }
 
     /// The board of the exchange, once there is one.

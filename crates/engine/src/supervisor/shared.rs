@@ -25,7 +25,7 @@ use crate::board::Board;
 use crate::event::{Event, EventLog, Occupant};
 use crate::link::LinkSet;
 use crate::ring::{Identity, RingMonitor};
-use crate::role::MainDeviceRole;
+use crate::role::RoleControl;
 use crate::time::Instant;
 
 pub(crate) struct Shared {
@@ -59,7 +59,7 @@ pub(crate) struct Shared {
     pub(super) bell: Bell,
     /// Largest number of datagrams in a frame.
     pub(crate) max_datagrams: usize,
-    pub(crate) role: MainDeviceRole,
+    pub(crate) role: RoleControl,
     pub(crate) current: TaskId,
     pub(crate) spawned: VecDeque<Task>,
     ready: VecDeque<TaskId>,
@@ -93,7 +93,7 @@ impl Shared {
             watchers: Watchers::default(),
             bell: Bell::default(),
             max_datagrams: usize::MAX,
-            role: MainDeviceRole::default(),
+            role: RoleControl::default(),
             current: TaskId(0),
             spawned: VecDeque::new(),
             ready: VecDeque::new(),

@@ -7,6 +7,7 @@ use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{Address, SubDeviceId};
 use ringcat_engine::ring_status::{Cable, Occupant};
 use ringcat_wire::address::Position;
+use ringcat_wire::frame::MacAddress;
 
 /// Names of declared SubDevices, by their index in the declaration. A position has no name of its own: an event that
 /// gives a position also gives the SubDevice that is there.
@@ -64,4 +65,10 @@ impl Names {
 /// The station address behind a blank, in brackets.
 fn station(occupant: Option<Occupant>) -> String {
     occupant.map_or_else(String::new, |occupant| format!(" ({})", occupant.station))
+}
+
+/// A MAC address in the usual notation: `02:00:00:00:00:01`.
+pub fn address(mac: MacAddress) -> String {
+    let bytes = mac.0.map(|byte| format!("{byte:02x}"));
+    bytes.join(":")
 }

@@ -64,7 +64,7 @@ async fn try_set_up(bus: &Bus, segment: &SharedSegment, opening: Opening) {
 }
 
 /// Runs until the MainDevice stops.
-async fn keep(bus: Bus, segment: SharedSegment) {
+pub(super) async fn keep(bus: Bus, segment: SharedSegment) {
     // The first clock may be added by a hot connect group.
     segment.until(|segment| segment.clocks().is_any().then_some(())).await;
     let mut pause = RETRY;
@@ -82,7 +82,7 @@ async fn keep(bus: Bus, segment: SharedSegment) {
     watch(&bus, &segment).await;
 }
 
-async fn watch(bus: &Bus, segment: &SharedSegment) {
+pub(super) async fn watch(bus: &Bus, segment: &SharedSegment) {
     let mut next_read = Instant::default();
     let mut seen = segment.view().changes();
     let mut seen_times = segment.board.clocks.times.posted();

@@ -9,6 +9,8 @@ use ringcat_wire::address::StationAddress;
 use crate::clocks::{Cables, KnownClocks, Latched, Measured, Wiring};
 use crate::config::ReferenceClock;
 use crate::link::Link;
+#[cfg(feature = "standby")]
+use crate::time::Instant;
 
 /// An observation of clocks: measured, written, read or lost.
 #[derive(Debug)]
@@ -42,6 +44,9 @@ pub enum ClockObservation<'a> {
     },
     /// Offsets and delays of all clocks are written.
     SetUp,
+    /// Another MainDevice has set the clocks up: they go on as they are.
+    #[cfg(feature = "standby")]
+    Adopted(&'a AdoptedClocks<'a>),
 
     /// The delays of all clocks after a change of the segment.
     MeasuredAgain(&'a Measured),
@@ -131,6 +136,34 @@ pub enum ClockObservation<'a> {
         /// Host time in nanoseconds.
         sent_at: u64,
     },
+}
+
+/// Clocks that another MainDevice has set up.
+#[cfg(feature = "standby")]
+#[derive(Clone, Copy, Debug)]
+pub struct AdoptedClocks<'a> {
+    /// What that MainDevice knows of them.
+    pub known: &'a KnownClocks,
+    /// Their registers, as far as they answer.
+    pub clocks: &'a [AdoptedClock],
+    /// DC_SYSTEM_TIME of the reference.
+    pub time: u64,
+    /// When the frame left that has read it.
+    pub sent_at: Instant,
+}
+
+/// Registers of a clock.
+#[cfg(feature = "standby")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AdoptedClock {
+    /// Its station address.
+    pub station: StationAddress,
+    /// DC_SYSTEM_TIME_OFFSET.
+    pub offset_ns: i64,
+    /// DC_SYSTEM_TIME_DELAY.
+    pub delay_ns: u32,
+    /// DC_FILTER_DIFFERENCE and DC_FILTER_SPEED.
+    pub filters: [u8; 2],
 }
 
 /// Local times latched by one frame.

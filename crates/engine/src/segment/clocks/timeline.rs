@@ -61,6 +61,13 @@ impl Times {
         first_epoch
     }
 
+    /// The system time goes on as it is: a first time of the application is not followed any more.
+    #[cfg(feature = "standby")]
+    pub fn follow_no_first(&mut self) {
+        self.is_first_followed = true;
+        self.far.clear();
+    }
+
     /// Whether readings of the reference are necessary.
     pub fn is_pending(&self) -> bool {
         !self.far.is_empty()

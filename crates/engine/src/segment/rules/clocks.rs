@@ -1,5 +1,7 @@
 //! Effects of observations of clocks (protocol 7).
 
+#[cfg(feature = "standby")]
+mod adopt;
 mod answers;
 mod delays;
 mod times;
@@ -38,6 +40,8 @@ impl Segment {
             ClockObservation::Measured(measured) => self.clocks.take_over(measured),
             ClockObservation::Latched { latched, wanted } => self.clocks.set_offsets(latched, wanted),
             ClockObservation::SetUp => self.observe_set_up(effects),
+            #[cfg(feature = "standby")]
+            ClockObservation::Adopted(adopted) => self.observe_adopted(adopted, now, effects),
 
             ClockObservation::MeasuredAgain(measured) => self.observe_measured_again(measured),
             ClockObservation::DelaysWritten(link) => self.observe_written(link),

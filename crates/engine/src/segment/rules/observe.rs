@@ -32,9 +32,7 @@ impl Segment {
             Words(words) if self.is_active() => self.observe_words(&words, now, effects),
             Words(words) => self.observe_idle_words(&words, now, effects),
             Idle(seen) => self.observe_idle(seen, now, effects),
-            PartOfRound { versions, readings, others, counted } => {
-                self.observe_part(versions, readings, others, counted)
-            }
+            PartOfRound { versions: v, readings: r, others: o, counted: c } => self.observe_part(v, r, o, c),
             Round(round_result) => self.observe_round(&round_result, now, effects),
             RoundEnded(number) => self.attention.end(number, now),
             RoundWanted => self.attention.want(),
@@ -49,6 +47,8 @@ impl Segment {
             Activated(declared) => self.activate(*declared, effects),
             Attached => self.begin_procedures(effects),
             Deactivated => self.deactivate(),
+            #[cfg(feature = "standby")]
+            Standby(seen) => self.observe_standby(seen, effects),
             SiiCompleted { key, read } => self.observe_whole_sii(key, read, effects),
             Started => self.start_all(effects),
             OfMember { index, attempt, finding } => self.observe_finding((index, attempt), finding, now, effects),

@@ -103,9 +103,18 @@ impl Segment {
 
     /// The procedures of the application begin.
     pub(in crate::segment) fn begin_procedures(&mut self, effects: &mut Effects) {
+        self.begin_watches(Watch::Clocks, effects);
+        match self.clocks.are_declared() {
+            true => self.delay_all(),
+            false => self.start_all(effects),
+        }
+    }
+
+    /// The procedures that run as long as the application begin. `clocks`: that of the clocks.
+    pub(in crate::segment) fn begin_watches(&mut self, clocks: Watch, effects: &mut Effects) {
         let (has_clocks, is_supervised) = (self.clocks.are_declared(), self.choices.supervision);
         let watches = [
-            (Watch::Clocks, has_clocks),
+            (clocks, has_clocks),
             (Watch::Supervision, is_supervised),
             (Watch::Registers, is_supervised),
             (Watch::Errors, is_supervised),
@@ -116,10 +125,6 @@ impl Segment {
         ];
         for (watch, _) in watches.into_iter().filter(|(_, is_needed)| *is_needed) {
             effects.start(Task::Watch(watch));
-        }
-        match has_clocks {
-            true => self.delay_all(),
-            false => self.start_all(effects),
         }
     }
 

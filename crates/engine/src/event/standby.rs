@@ -1,0 +1,255 @@
+//! Events of MainDevice redundancy (protocol 9.6).
+
+use alloc::format;
+use alloc::string::String;
+use core::time::Duration;
+
+use ringcat_wire::frame::MacAddress;
+use ringcat_wire::master_frame::{NotReady, Stage};
+
+use crate::link::Link;
+use crate::queue::WORDS;
+use crate::role::{MainDeviceRole, Partner, RoleCause};
+
+/// An event of MainDevice redundancy.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum StandbyEvent {
+    /// The role has changed.
+    RoleChanged {
+        /// The role now.
+        role: MainDeviceRole,
+        /// Why.
+        cause: RoleCause,
+    },
+    /// This MainDevice controls the bus, and goes on with the process data of the other one.
+    TookOver {
+        /// Time since a frame of the other MainDevice came last; `None` if none has come.
+        silence: Option<Duration>,
+        /// SubDevices that go on as they are.
+        in_state: u16,
+        /// They keep their configuration; otherwise all are configured again from INIT on.
+        is_hot: bool,
+    },
+    /// What this MainDevice, as ACTIVE, knows of the other one has changed.
+    Partner(Partner),
+    /// A frame of another MainDevice came while this one is ACTIVE (protocol MR-10).
+    Collision {
+        /// The link on which it arrived.
+        arrived_on: Link,
+        /// Its source address.
+        source: MacAddress,
+    },
+    /// The other MainDevice has another configuration (protocol REQ010).
+    ConfigurationDiffers {
+        /// Number of the first item that was found to differ; `None` if their number does.
+        item: Option<u16>,
+        /// What differs.
+        what: String,
+    },
+    /// The other MainDevice has master frames of a version that this one cannot read.
+    OtherVersion {
+        /// Its version.
+        got: u8,
+        /// The oldest version that could read it.
+        least: u8,
+    },
+    /// The role was to be handed over, and the other MainDevice does not take it.
+    HandOverRefused(Partner),
+}
+
+const KIND_ROLE: u64 = 0x10;
+const KIND_TOOK_OVER: u64 = 0x11;
+const KIND_PARTNER: u64 = 0x12;
+const KIND_COLLISION: u64 = 0x13;
+const KIND_ITEM: u64 = 0x14;
+const KIND_COUNT: u64 = 0x15;
+const KIND_VERSION: u64 = 0x16;
+const KIND_REFUSED: u64 = 0x17;
+
+/// An event of the exchange, which is packed into words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CyclicStandbyEvent {
+    /// See [`StandbyEvent::RoleChanged`].
+    RoleChanged(MainDeviceRole, RoleCause),
+    /// See [`StandbyEvent::TookOver`].
+    TookOver {
+        /// Time since the last frame.
+        silence: Option<Duration>,
+        /// SubDevices that go on.
+        in_state: u16,
+        /// They keep their configuration.
+        is_hot: bool,
+    },
+    /// See [`StandbyEvent::Partner`].
+    Partner(Partner),
+    /// See [`StandbyEvent::Collision`].
+    Collision {
+        /// The link.
+        arrived_on: Link,
+        /// The source address.
+        source: MacAddress,
+    },
+    /// An item of the configuration differs.
+    Item(u16),
+    /// The number of items differs.
+    Count {
+        /// Here.
+        here: u16,
+        /// At the other MainDevice.
+        there: u16,
+    },
+    /// See [`StandbyEvent::OtherVersion`].
+    OtherVersion {
+        /// Its version.
+        got: u8,
+        /// The oldest version that could read it.
+        least: u8,
+    },
+    /// See [`StandbyEvent::HandOverRefused`].
+    HandOverRefused(Partner),
+}
+
+impl CyclicStandbyEvent {
+    /// As words; the lowest byte of the first is the kind.
+    pub const fn pack(self) -> [u64; WORDS] {
+        match self {
+            CyclicStandbyEvent::RoleChanged(role, cause) => {
+                let role = matches!(role, MainDeviceRole::Inactive) as u64;
+                let cause = match cause {
+                    RoleCause::Requested => 0,
+                    RoleCause::HandedOver => 1,
+                    RoleCause::LinksLost => 2,
+                };
+                [KIND_ROLE | role << 8 | cause << 16, 0, 0]
+            }
+            CyclicStandbyEvent::TookOver { silence, in_state, is_hot } => {
+                let silence = match silence {
+                    Some(silence) => silence.as_nanos() as u64 | 1 << 63,
+                    None => 0,
+                };
+                [KIND_TOOK_OVER | (is_hot as u64) << 8 | (in_state as u64) << 16, silence, 0]
+            }
+            CyclicStandbyEvent::Partner(partner) => [KIND_PARTNER, partner_word(partner), 0],
+            CyclicStandbyEvent::Collision { arrived_on, source: MacAddress([a, b, c, d, e, f]) } => {
+                let source = u64::from_le_bytes([a, b, c, d, e, f, 0, 0]);
+                [KIND_COLLISION | (matches!(arrived_on, Link::Redundant) as u64) << 8, source, 0]
+            }
+            CyclicStandbyEvent::Item(number) => [KIND_ITEM | (number as u64) << 16, 0, 0],
+            CyclicStandbyEvent::Count { here, there } => {
+                [KIND_COUNT | (here as u64) << 16 | (there as u64) << 32, 0, 0]
+            }
+            CyclicStandbyEvent::OtherVersion { got, least } => {
+                [KIND_VERSION | (got as u64) << 8 | (least as u64) << 16, 0, 0]
+            }
+            CyclicStandbyEvent::HandOverRefused(partner) => [KIND_REFUSED, partner_word(partner), 0],
+        }
+    }
+
+    /// Unpacks words; `None` for words that [`CyclicStandbyEvent::pack`] does not make.
+    pub const fn unpack(words: [u64; WORDS]) -> Option<CyclicStandbyEvent> {
+        let (bytes, half) = (words[0].to_le_bytes(), (words[0] >> 16) as u16);
+        match words[0] & 0xFF {
+            KIND_ROLE => {
+                let role = if bytes[1] == 0 { MainDeviceRole::Active } else { MainDeviceRole::Inactive };
+                let cause = match bytes[2] {
+                    0 => RoleCause::Requested,
+                    1 => RoleCause::HandedOver,
+                    2 => RoleCause::LinksLost,
+                    _ => return None,
+                };
+                Some(CyclicStandbyEvent::RoleChanged(role, cause))
+            }
+            KIND_TOOK_OVER => {
+                let silence = Duration::from_nanos(words[1] & !(1 << 63));
+                let silence = if words[1] >> 63 != 0 { Some(silence) } else { None };
+                Some(CyclicStandbyEvent::TookOver { silence, in_state: half, is_hot: bytes[1] != 0 })
+            }
+            KIND_PARTNER => Some(CyclicStandbyEvent::Partner(partner_of(words[1]))),
+            KIND_COLLISION => {
+                let arrived_on = if bytes[1] == 0 { Link::Main } else { Link::Redundant };
+                let [a, b, c, d, e, f, _, _] = words[1].to_le_bytes();
+                Some(CyclicStandbyEvent::Collision { arrived_on, source: MacAddress([a, b, c, d, e, f]) })
+            }
+            KIND_ITEM => Some(CyclicStandbyEvent::Item(half)),
+            KIND_COUNT => Some(CyclicStandbyEvent::Count { here: half, there: (words[0] >> 32) as u16 }),
+            KIND_VERSION => Some(CyclicStandbyEvent::OtherVersion { got: bytes[1], least: bytes[2] }),
+            KIND_REFUSED => Some(CyclicStandbyEvent::HandOverRefused(partner_of(words[1]))),
+            _ => None,
+        }
+    }
+
+    /// The event as the application receives it. `name_of`: the item of the configuration with a number.
+    pub fn event(self, name_of: impl FnOnce(u16) -> String) -> StandbyEvent {
+        match self {
+            CyclicStandbyEvent::RoleChanged(role, cause) => StandbyEvent::RoleChanged { role, cause },
+            CyclicStandbyEvent::TookOver { silence, in_state, is_hot } => {
+                StandbyEvent::TookOver { silence, in_state, is_hot }
+            }
+            CyclicStandbyEvent::Partner(partner) => StandbyEvent::Partner(partner),
+            CyclicStandbyEvent::Collision { arrived_on, source } => StandbyEvent::Collision { arrived_on, source },
+            CyclicStandbyEvent::Item(number) => {
+                StandbyEvent::ConfigurationDiffers { item: Some(number), what: name_of(number) }
+            }
+            CyclicStandbyEvent::Count { here, there } => StandbyEvent::ConfigurationDiffers {
+                item: None,
+                what: format!("{here} items here, {there} there: another number of SubDevices or domains"),
+            },
+            CyclicStandbyEvent::OtherVersion { got, least } => StandbyEvent::OtherVersion { got, least },
+            CyclicStandbyEvent::HandOverRefused(partner) => StandbyEvent::HandOverRefused(partner),
+        }
+    }
+}
+
+const fn partner_word(partner: Partner) -> u64 {
+    match partner {
+        Partner::Absent => 0,
+        Partner::Forwards => 1,
+        Partner::Alive { stage, not_ready, is_consistent } => {
+            2 | (stage.code() as u64) << 8 | (is_consistent as u64) << 16 | (not_ready.0 as u64) << 32
+        }
+    }
+}
+
+const fn partner_of(word: u64) -> Partner {
+    let bytes = word.to_le_bytes();
+    match bytes[0] {
+        0 => Partner::Absent,
+        1 => Partner::Forwards,
+        _ => Partner::Alive {
+            stage: Stage::from_code(bytes[1]),
+            is_consistent: bytes[2] != 0,
+            not_ready: NotReady((word >> 32) as u16),
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::event::CyclicEvent;
+
+    // covers: MR-04, MR-10, standby
+    #[test]
+    fn events_of_the_standby_survive_the_words() {
+        let alive = Partner::Alive { stage: Stage::Ready, not_ready: NotReady(0x41), is_consistent: true };
+        let source = MacAddress([1, 2, 3, 4, 5, 6]);
+        let events = [
+            CyclicStandbyEvent::RoleChanged(MainDeviceRole::Inactive, RoleCause::LinksLost),
+            CyclicStandbyEvent::RoleChanged(MainDeviceRole::Active, RoleCause::HandedOver),
+            CyclicStandbyEvent::TookOver { silence: Some(Duration::from_nanos(7)), in_state: 33, is_hot: true },
+            CyclicStandbyEvent::TookOver { silence: None, in_state: 0, is_hot: false },
+            CyclicStandbyEvent::Partner(alive),
+            CyclicStandbyEvent::Partner(Partner::Forwards),
+            CyclicStandbyEvent::Collision { arrived_on: Link::Redundant, source },
+            CyclicStandbyEvent::Item(0x1234),
+            CyclicStandbyEvent::Count { here: 33, there: 0xFFFF },
+            CyclicStandbyEvent::OtherVersion { got: 3, least: 2 },
+            CyclicStandbyEvent::HandOverRefused(Partner::Absent),
+        ];
+        for event in events {
+            assert_eq!(CyclicEvent::unpack(event.pack()), Some(CyclicEvent::Standby(event)));
+        }
+        assert_eq!(CyclicStandbyEvent::unpack([0x1F, 0, 0]), None);
+    }
+}

@@ -1,0 +1,110 @@
+//! The part of the exchange in MainDevice redundancy: the role, and what goes with it in each cycle (protocol 9.6,
+//! 9.8).
+//!
+//! ACTIVE: master frames follow the frames with process data ([`super::master_frames`]); what comes back in them shows
+//! whether the other MainDevice is there and follows. INACTIVE: nothing is sent; the images are those of the ACTIVE
+//! ([`super::following`]). [`Exchange::begin_role`] changes the role, at the beginning of a cycle and nowhere else.
+
+mod active;
+mod inactive;
+mod pace;
+mod partner;
+mod roles;
+pub mod state;
+
+use alloc::boxed::Box;
+
+use ringcat_wire::master_frame::{Header, NotReady};
+
+use super::Exchange;
+use super::following::{Following, OutputsSeen};
+use super::master_frames::MasterFrames;
+use crate::domain::DomainId;
+use crate::layout::Layout;
+use crate::link::LinkSet;
+use crate::role::{MainDeviceRole, Partner};
+use crate::time::Instant;
+
+use partner::{Items, PartnerWatch};
+use state::{Standby, StandbySetup, State};
+
+impl Exchange {
+    /// From now on this MainDevice is one of two in a ring, in the role of its control. Not for the cyclic path: this
+    /// allocates. Without a redundant link nothing is set up (protocol MR-22).
+    pub fn set_up_standby(&mut self, layout: &Layout, setup: StandbySetup) {
+        if self.links != LinkSet::Ring {
+            return;
+        }
+        let StandbySetup { planned, items, identity, session, exchanges_from, control, words, .. } = setup;
+        let period = layout.home().map_or(0, |home| layout.domains[home].period.as_nanos() as u64);
+        let items = Items::new(identity, items);
+        let mut header = Header::new();
+        (header.session, header.identity, header.item) = (session, identity, items.first());
+        header.period_ns = u32::try_from(period).unwrap_or(u32::MAX);
+        let mut following = Following::new(planned.lengths, words.clone());
+        (following.answer.identity, following.answer.item) = (identity, items.first());
+        following.answer.not_ready = NotReady::NO_CYCLE;
+        self.standby = Standby(Some(Box::new(State {
+            role: control.role(),
+            frames: MasterFrames::new(&self.identity, &planned, header, home_domains(layout)),
+            following,
+            outputs: OutputsSeen::new(layout),
+            watch: PartnerWatch::default(),
+            items,
+            exchanges_from,
+            yields_without_links: setup.yields_without_links,
+            goes_through_init: setup.goes_through_init,
+            offered: 0,
+            shown: None,
+            foreign_in: 0,
+            other_version: None,
+            noticed: None,
+            begun_at: Instant::NEVER,
+            runs: planned.inputs.into_boxed_slice(),
+            period_ns: period,
+            control,
+            words,
+        })));
+    }
+
+    /// The role; ACTIVE without MainDevice redundancy.
+    pub fn role(&self) -> MainDeviceRole {
+        self.standby.0.as_ref().map_or(MainDeviceRole::Active, |state| state.role)
+    }
+
+    /// What the ACTIVE knows of the other MainDevice.
+    pub fn partner(&self) -> Partner {
+        self.standby.0.as_ref().map_or(Partner::Absent, |state| state.watch.partner())
+    }
+
+    /// Process data for the other MainDevice: what leaves in this role. The bytes of the other direction are left out
+    /// (protocol FR-15).
+    pub fn to_partner_mut(&mut self) -> &mut [u8] {
+        match self.standby.0.as_deref_mut() {
+            Some(State { role: MainDeviceRole::Active, frames, .. }) => &mut frames.to_inactive,
+            Some(State { role: MainDeviceRole::Inactive, following, .. }) => &mut following.to_active,
+            None => &mut [],
+        }
+    }
+
+    /// Process data of the other MainDevice, of the last cycle in which all of it has arrived; empty before.
+    pub fn from_partner(&self) -> &[u8] {
+        match self.standby.0.as_deref() {
+            Some(State { role: MainDeviceRole::Active, frames, .. }) if frames.to_active_cycle.is_some() => {
+                &frames.to_active
+            }
+            Some(State { role: MainDeviceRole::Inactive, following, .. }) => {
+                following.whole().map_or(&[], |whole| &whole.content.to_inactive)
+            }
+            Some(_) | None => &[],
+        }
+    }
+}
+
+/// The first domain of each SubDevice.
+fn home_domains(layout: &Layout) -> Box<[Option<DomainId>]> {
+    let areas = || layout.domains.iter().flat_map(|domain| &domain.areas).map(|placed| placed.area.subdevice);
+    let count = areas().max().map_or(0, |last| last + 1);
+    let domain_of = |subdevice: usize| layout.areas_of(subdevice).next().map(|(id, _)| id);
+    (0..count).map(domain_of).collect()
+}

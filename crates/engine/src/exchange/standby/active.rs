@@ -1,0 +1,158 @@
+//! The exchange of the ACTIVE: master frames out and back, and frames of others.
+
+use ringcat_wire::frame::MacAddress;
+use ringcat_wire::master_frame::{Phase, Stage};
+
+use super::Exchange;
+use super::partner::{Difference, Items};
+use super::state::State;
+use crate::event::CyclicStandbyEvent;
+use crate::exchange::Received;
+use crate::exchange::flight::Step;
+use crate::exchange::master_frames::{Returned, Sources};
+use crate::link::Link;
+use crate::queue::Producer;
+use crate::ring::{FrameCopy, Sequence};
+use crate::role::{MainDeviceRole, Partner};
+
+/// Ids of master frames count on from here: no frame with process data has such an index.
+pub(super) const INDEX: u16 = 0x4000;
+/// Cycles in which the role is offered before that is given up.
+const PATIENCE: u8 = 50;
+/// Cycles without a frame of another MainDevice after which the next one is another collision.
+const APART: u64 = 100;
+
+impl Exchange {
+    /// Sends the master frames of this cycle, whose frames with process data followed the one with number `before`.
+    #[inline(never)]
+    pub(in crate::exchange) fn send_master_frames(&mut self, before: Sequence, transmit: &mut impl FnMut(Link, &[u8])) {
+        let Some(state) = self.standby.0.as_deref_mut() else { return };
+        if state.frames.cycle != 0 {
+            let lost = state.frames.lost();
+            if lost > 0 {
+                self.tally.disturbed().lost += lost;
+                self.board.post_lost(self.tally.counters.lost);
+            }
+            state.evaluate(&mut self.events);
+        }
+        let header = &mut state.frames.header;
+        header.first = before.next().number();
+        header.frames = self.sequence.since(before) as u16;
+        header.item = state.items.next();
+        let (board, domains, counters) = (&*self.board, &self.domains[..], &self.tally.counters);
+        let ring = self.evidence.monitor.state();
+        state.frames.load(&Sources { board, words: &state.words, domains, counters, ring });
+        let (sequence, by_id) = (&mut self.sequence, &mut self.by_id);
+        let next = |number: usize| {
+            *sequence = sequence.next();
+            by_id[usize::from(sequence.frame_id())] = INDEX + number as u16;
+            *sequence
+        };
+        let bytes = state.frames.send(&self.identity, self.links, next, transmit);
+        self.tally.counters.sent += state.frames.count() as u64;
+        self.tally.counters.bytes += bytes;
+    }
+
+    /// Takes a copy of a frame with this index, if it is a master frame.
+    #[inline(never)]
+    pub(in crate::exchange) fn receive_master(
+        &mut self,
+        index: u16,
+        copy: FrameCopy,
+        bytes: &[u8],
+    ) -> Option<Received> {
+        let state = self.standby.0.as_deref_mut()?;
+        let number = usize::from(index.checked_sub(INDEX)?);
+        if number >= state.frames.count() {
+            return None;
+        }
+        Some(match state.frames.receive(number, copy, bytes) {
+            Step::Waiting => {
+                self.board.traffic.post_half_home(copy.sent_on, copy.sequence);
+                Received::Taken
+            }
+            Step::Finished => {
+                self.board.traffic.post_home(copy.sequence);
+                self.tally.counters.received += 1;
+                Received::Taken
+            }
+            Step::Late => {
+                self.tally.disturbed().late += 1;
+                Received::Late
+            }
+            Step::Corrupt => {
+                self.tally.disturbed().corrupt += 1;
+                Received::Corrupt
+            }
+        })
+    }
+
+    /// A frame of another MainDevice has come: as ACTIVE a collision (protocol MR-10), reported once for frames that
+    /// follow each other.
+    pub(in crate::exchange) fn note_foreign(&mut self, arrived_on: Link, bytes: &[u8]) {
+        let now = self.cycle + 1;
+        let Some(state) = self.standby.0.as_deref_mut().filter(|it| it.role == MainDeviceRole::Active) else { return };
+        let last = core::mem::replace(&mut state.foreign_in, now);
+        if let Some(source) = bytes.get(6..).and_then(<[u8]>::first_chunk)
+            && (last == 0 || now - last > APART)
+        {
+            let source = MacAddress(*source);
+            self.events.push(CyclicStandbyEvent::Collision { arrived_on, source }.pack());
+        }
+    }
+}
+
+impl State {
+    /// Evaluates what the last cycle has brought back.
+    fn evaluate(&mut self, events: &mut Producer) {
+        let returned = self.frames.returned();
+        if let Some(partner) = self.watch.note(&returned) {
+            events.push(CyclicStandbyEvent::Partner(partner).pack());
+        }
+        if let Some(answer) = returned.answer {
+            compare(&mut self.items, (answer.identity, answer.item), events);
+        }
+        if self.frames.header.phase == Phase::Offers {
+            self.offer(&returned, events);
+        }
+    }
+
+    /// The role is offered: the next cycle is the last one if the other MainDevice takes it.
+    fn offer(&mut self, returned: &Returned, events: &mut Producer) {
+        let is_accepted = returned.is_taken && returned.answer.is_some_and(|answer| answer.stage == Stage::Accepts);
+        self.offered = self.offered.saturating_add(1);
+        if is_accepted {
+            self.frames.header.phase = Phase::Ends;
+        } else if self.offered >= PATIENCE {
+            self.frames.header.phase = Phase::Goes;
+            events.push(CyclicStandbyEvent::HandOverRefused(self.watch.partner()).pack());
+        }
+    }
+
+    /// Begins to offer the role.
+    pub(super) fn begin_offer(&mut self, events: &mut Producer) {
+        let partner = self.watch.partner();
+        if matches!(partner, Partner::Alive { .. }) && partner.is_ready() {
+            (self.offered, self.frames.header.phase) = (0, Phase::Offers);
+        } else {
+            events.push(CyclicStandbyEvent::HandOverRefused(partner).pack());
+        }
+    }
+}
+
+/// Compares the configuration of the other MainDevice with the own one.
+pub(super) fn compare(
+    items: &mut Items,
+    (identity, item): (u64, ringcat_wire::master_frame::Item),
+    events: &mut Producer,
+) {
+    match items.compare(identity, item) {
+        Some(Difference::Item(number)) => {
+            events.push(CyclicStandbyEvent::Item(number).pack());
+        }
+        Some(Difference::Count { here, there }) => {
+            events.push(CyclicStandbyEvent::Count { here, there }.pack());
+        }
+        None => {}
+    }
+}

@@ -1,0 +1,146 @@
+//! Changes of the role, at the beginning of a cycle (protocol MR-02, MR-07).
+
+use ringcat_wire::master_frame::{Answer, Phase};
+
+use super::Exchange;
+use super::state::State;
+use crate::domain::DomainStatus;
+use crate::event::CyclicStandbyEvent;
+use crate::exchange::domain::Domain;
+use crate::exchange::flight::CyclicFrame;
+use crate::link::Link;
+use crate::role::{MainDeviceRole, RoleCause, RoleRequest};
+use crate::time::Instant;
+
+/// What the beginning of a cycle does to the role.
+enum Change {
+    None,
+    ToActive(RoleCause),
+    ToInactive(RoleCause),
+}
+
+impl Exchange {
+    /// A cycle begins: a requested role takes effect. As INACTIVE the images then show the last whole cycle of the
+    /// ACTIVE. Returns the role if it has changed. The first step of a cycle, before domains are processed; without
+    /// MainDevice redundancy it does nothing.
+    #[inline(always)]
+    pub fn begin_role(&mut self, now: Instant) -> Option<MainDeviceRole> {
+        if self.standby.0.is_some() { self.begin_role_of_two(now) } else { None }
+    }
+
+    #[inline(never)]
+    fn begin_role_of_two(&mut self, now: Instant) -> Option<MainDeviceRole> {
+        let state = self.standby.0.as_deref_mut()?;
+        let request = if state.control.is_requested() { state.control.take_request() } else { None };
+        let change = match state.role {
+            MainDeviceRole::Active => {
+                if request == Some(RoleRequest::HandOver) {
+                    state.begin_offer(&mut self.events);
+                }
+                let is_down = |link: &Link| self.board.live.carrier(*link) == Some(false);
+                let is_alone = state.yields_without_links && Link::ALL.iter().all(is_down);
+                match request {
+                    _ if state.frames.header.phase == Phase::Ends => Change::ToInactive(RoleCause::HandedOver),
+                    Some(RoleRequest::Inactive) => Change::ToInactive(RoleCause::Requested),
+                    _ if is_alone => Change::ToInactive(RoleCause::LinksLost),
+                    Some(RoleRequest::Active | RoleRequest::HandOver) | None => Change::None,
+                }
+            }
+            MainDeviceRole::Inactive => match request {
+                _ if state.is_handed_over(now) => Change::ToActive(RoleCause::HandedOver),
+                Some(RoleRequest::Active) => Change::ToActive(RoleCause::Requested),
+                Some(RoleRequest::Inactive | RoleRequest::HandOver) | None => Change::None,
+            },
+        };
+        state.begun_at = now;
+        let (role, cause) = match change {
+            Change::None if state.role == MainDeviceRole::Inactive => {
+                self.follow_cycle(now);
+                return None;
+            }
+            Change::None => return None,
+            Change::ToActive(cause) => (MainDeviceRole::Active, cause),
+            Change::ToInactive(cause) => (MainDeviceRole::Inactive, cause),
+        };
+        let event = CyclicStandbyEvent::RoleChanged(role, cause);
+        self.events.push(event.pack());
+        match role {
+            MainDeviceRole::Active => self.take_over(now),
+            MainDeviceRole::Inactive => self.yield_role(),
+        }
+        Some(role)
+    }
+
+    /// This MainDevice controls the bus from this cycle on, with the outputs and inputs that the other one had.
+    fn take_over(&mut self, now: Instant) {
+        let left = self.cycle + 1;
+        let Some(state) = self.standby.0.as_deref_mut() else { return };
+        let last = state.following.newest();
+        state.show_whole(&mut self.domains, left);
+        if state.outputs.has_any() {
+            let outputs = &state.outputs;
+            let images = self.domains.iter_mut().map(Domain::image_mut);
+            images.enumerate().for_each(|(domain, image)| outputs.go_on(domain, image));
+        }
+        let is_hot = state.is_hot();
+        let in_state = if is_hot { state.take_part(&self.board) } else { 0 };
+        state.words.post_hot(is_hot);
+        let silence = last.map(|(_, at)| now.since(at));
+        if let Some((cycle, _)) = last {
+            state.frames.cycle = cycle;
+        }
+        state.frames.header.phase = Phase::Goes;
+        state.become_role(MainDeviceRole::Active);
+        self.events.push(CyclicStandbyEvent::TookOver { silence, in_state, is_hot }.pack());
+    }
+
+    /// The other MainDevice may control the bus from this cycle on: nothing is sent any more.
+    fn yield_role(&mut self) {
+        let left = self.cycle + 1;
+        let Some(state) = self.standby.0.as_deref_mut() else { return };
+        self.frames.iter_mut().for_each(CyclicFrame::close);
+        self.again.iter_mut().flatten().for_each(|again| again.frame.close());
+        for (number, domain) in self.domains.iter_mut().enumerate() {
+            let status = DomainStatus { pending: false, ..domain.status(false) };
+            domain.follow(status, left, |_| false);
+            state.outputs.forget();
+            state.outputs.set(number, domain.image());
+        }
+        self.decide_at = Instant::NEVER;
+        state.following.reset();
+        state.frames.end();
+        state.become_role(MainDeviceRole::Inactive);
+    }
+}
+
+impl State {
+    fn become_role(&mut self, role: MainDeviceRole) {
+        self.role = role;
+        self.watch.forget();
+        (self.foreign_in, self.shown, self.noticed) = (0, None, None);
+        let (identity, item) = (self.following.answer.identity, self.items.first());
+        self.following.answer = Answer { identity, item, ..Answer::new() };
+        self.control.set(role);
+    }
+
+    /// Whether SubDevices can go on as the other MainDevice has left them: their registers are those of this
+    /// configuration. Otherwise they are configured again from INIT on, which is a warm takeover (protocol MR-18).
+    fn is_hot(&self) -> bool {
+        let Some(whole) = self.following.whole() else { return false };
+        let is_same = whole.header.identity == self.frames.header.identity;
+        !self.goes_through_init && is_same && whole.header.session == self.frames.header.session
+    }
+
+    /// Whether the ACTIVE has ended with the newest cycle, in which this MainDevice has accepted its role.
+    pub(super) fn is_handed_over(&self, now: Instant) -> bool {
+        let Some((cycle, begun_at)) = self.following.newest() else { return false };
+        let is_due = now.since(begun_at).as_nanos() >= u128::from(self.period_ns / 2);
+        self.noticed == Some(cycle) && is_due && self.ends_with(cycle)
+    }
+
+    /// Whether the ACTIVE ends with a cycle, and hands its role over.
+    pub(super) fn ends_with(&self, cycle: u32) -> bool {
+        let header = self.following.header_of(cycle);
+        header.is_some_and(|(header, _)| header.phase == Phase::Ends) && self.following.has_accepted(cycle)
+    }
+}

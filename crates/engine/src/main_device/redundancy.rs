@@ -1,0 +1,125 @@
+//! MainDevice redundancy: the role, what was heard of the other MainDevice, and what it needs of this one.
+
+use alloc::vec::Vec;
+use core::time::Duration;
+
+use ringcat_wire::al::AlState;
+
+use super::MainDevice;
+use super::declaration::Declaration;
+use super::identity::Configuration;
+use super::standby::Marks;
+use crate::exchange::{Exchange, StandbySetup};
+use crate::knowledge::Knowledge;
+use crate::layout::{Layout, LayoutError, LrwPolicy, PlannedMasterFrames};
+use crate::link::LinkSet;
+use crate::role::{MainDeviceRole, RoleControl};
+use crate::segment::SubDevices;
+use crate::time::Instant;
+
+/// Shortest time between two publications of the knowledge.
+const PUBLISHED_EACH: Duration = Duration::from_millis(200);
+/// Knowledge that has not changed in what is compared is made again after this time.
+const PUBLISHED_AGAIN: Duration = Duration::from_secs(5);
+
+impl MainDevice {
+    /// The role, and requests for another one: for any thread.
+    pub fn role_control(&self) -> RoleControl {
+        self.roles.clone()
+    }
+
+    /// Knowledge of the segment that the ACTIVE has sent, with which an application can follow it
+    /// ([`MainDevice::follow`]); `None` before all of it has arrived.
+    pub fn heard_knowledge(&self) -> Option<Knowledge> {
+        let (_, bytes) = self.standby.as_ref()?.words.heard.copy()?;
+        Knowledge::from_bytes(&bytes).ok()
+    }
+
+    /// Session and digest of the configuration of the ACTIVE; `None` before a frame of it.
+    pub fn heard_configuration(&self) -> Option<(u16, u64)> {
+        self.standby.as_ref()?.words.header()
+    }
+
+    /// Digest of the configuration of the active application; `None` without one.
+    pub fn configuration_digest(&self) -> Option<u64> {
+        self.active()?;
+        Some(self.standby.as_ref()?.configuration.digest())
+    }
+
+    /// LRW is not allowed: the INACTIVE takes outputs from frames that have passed SubDevices (protocol REQ047).
+    pub(super) fn is_lrw_refused(&self, lrw: LrwPolicy) -> bool {
+        self.standby.is_some() && lrw == LrwPolicy::PerSubDevice
+    }
+
+    /// Sets up the exchange for a ring of two MainDevices.
+    pub(super) fn set_up_standby(
+        &mut self,
+        exchange: &mut Exchange,
+        (declaration, layout, session): (&Declaration, &Layout, u32),
+        subdevices: &SubDevices,
+    ) -> Result<(), LayoutError> {
+        if self.options.links() != LinkSet::Ring {
+            return Ok(());
+        }
+        let configuration = Configuration::of(declaration, &self.options);
+        let Some(standby) = &mut self.standby else { return Ok(()) };
+        let planned = PlannedMasterFrames::new(standby.options.sizes, layout, subdevices.member_count())?;
+        (standby.configuration, standby.session) = (configuration, Some(session));
+        (standby.publish_at, standby.published) = ((Instant(0), Instant(0)), None);
+        let lowest = |is_op_only: bool| if is_op_only { AlState::Op } else { AlState::SafeOp };
+        let exchanges_from: Vec<u8> = subdevices
+            .members()
+            .map(|member| member.setup.as_ref().map_or(0, |setup| lowest(setup.plan.is_op_only()) as u8))
+            .collect();
+        exchange.set_up_standby(
+            layout,
+            StandbySetup {
+                planned,
+                items: standby.configuration.items(),
+                identity: standby.configuration.digest(),
+                session: (session % crate::layout::SESSIONS) as u16,
+                exchanges_from: exchanges_from.into(),
+                yields_without_links: standby.options.yields_without_links,
+                goes_through_init: standby.options.goes_through_init,
+                control: self.roles.clone(),
+                words: standby.words.clone(),
+            },
+        );
+        Ok(())
+    }
+
+    /// Publishes the knowledge of the segment for the other MainDevice, if it is time.
+    pub(super) fn publish_knowledge(&mut self, now: Instant) {
+        let Some(standby) = &self.standby else { return };
+        let (earliest, latest) = standby.publish_at;
+        if now < earliest || self.role() != MainDeviceRole::Active || self.active().is_none() {
+            return;
+        }
+        let marks = self.marks();
+        if standby.published == Some(marks) && now < latest {
+            return;
+        }
+        let bytes = self.knowledge().map(|knowledge| knowledge.to_bytes()).unwrap_or_default();
+        let Some(standby) = &mut self.standby else { return };
+        standby.published = Some(marks);
+        standby.publish_at = (now + PUBLISHED_EACH, now + PUBLISHED_AGAIN);
+        let is_same = standby.words.knowledge.copy().is_some_and(|(_, before)| before == bytes);
+        if !is_same {
+            standby.words.knowledge.write(&bytes);
+        }
+    }
+
+    fn marks(&self) -> Marks {
+        let view = self.segment.view();
+        let is_settled = |member: &crate::segment::member::MemberView<'_>| {
+            matches!(member.phase, crate::segment::member::Phase::Settled(_))
+        };
+        Marks {
+            cabling: view.versions().cabling,
+            adoptions: view.adoptions(),
+            settled: view.members().filter(is_settled).count(),
+            known: view.subdevices().all().iter().filter(|it| it.knowledge.info().is_some()).count(),
+            clocks: view.clocks().are_locked(),
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! What a MainDevice of two has: options, what both halves share, and the other MainDevice as this one knows it.
+
+use alloc::sync::Arc;
+
+use ringcat_wire::master_frame::{Lengths, NotReady};
+
+use super::identity::Configuration;
+use super::standby_options::StandbyOptions;
+use crate::board::standby::StandbyWords;
+use crate::event::{CyclicEvent, Event};
+use crate::exchange::following::Following;
+use crate::time::Instant;
+
+/// What a MainDevice has for redundancy.
+#[derive(Debug)]
+pub(super) struct Standby {
+    pub options: StandbyOptions,
+    pub words: Arc<StandbyWords>,
+    /// The configuration of the application.
+    pub configuration: Configuration,
+    /// Session of the process data.
+    pub session: Option<u32>,
+    /// What is heard of the ACTIVE without an application.
+    pub listening: Following,
+    /// When.
+    pub heard_at: Option<Instant>,
+    /// A version of the ACTIVE that cannot be read, and was reported.
+    pub other_version: Option<u8>,
+    /// When the knowledge is made next, at the earliest and if nothing has changed.
+    pub publish_at: (Instant, Instant),
+    /// What the published knowledge was made from.
+    pub published: Option<Marks>,
+}
+
+/// Numbers that change with most changes of the knowledge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Marks {
+    pub cabling: u32,
+    pub adoptions: u32,
+    pub settled: usize,
+    pub known: usize,
+    /// Measurements of the clocks that are valid.
+    pub clocks: bool,
+}
+
+impl Standby {
+    pub fn new(options: StandbyOptions) -> Standby {
+        let words: Arc<StandbyWords> = Arc::default();
+        let mut listening = Following::new(Lengths::default(), words.clone());
+        listening.answer.not_ready = NotReady::NO_APPLICATION;
+        Standby {
+            options,
+            words,
+            configuration: Configuration::default(),
+            session: None,
+            listening,
+            heard_at: None,
+            other_version: None,
+            publish_at: (Instant(0), Instant(0)),
+            published: None,
+        }
+    }
+}
+
+/// Names what an event of the cyclic half has found to differ.
+pub(super) fn named(standby: &Option<Standby>, event: CyclicEvent) -> Event {
+    match (event, standby) {
+        (CyclicEvent::Standby(event), Some(standby)) => {
+            Event::Standby(event.event(|number| standby.configuration.name_of(number)))
+        }
+        (event, _) => event.event(),
+    }
+}

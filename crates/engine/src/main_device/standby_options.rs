@@ -1,0 +1,46 @@
+//! Options of MainDevice redundancy.
+
+use crate::layout::MasterSizes;
+
+/// Options of MainDevice redundancy. Both MainDevices of a ring have the same (protocol REQ010).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct StandbyOptions {
+    /// Sizes of the areas in master frames.
+    pub sizes: MasterSizes,
+    /// Whether the ACTIVE becomes INACTIVE when both links have lost their carriers (protocol MR-25). On by default:
+    /// the other MainDevice has taken over when the links are back.
+    pub yields_without_links: bool,
+    /// Whether all SubDevices are configured again from INIT on after a takeover (warm standby, protocol MR-18). Off by
+    /// default: they go on as they are.
+    pub goes_through_init: bool,
+}
+
+impl Default for StandbyOptions {
+    fn default() -> StandbyOptions {
+        StandbyOptions { sizes: MasterSizes::default(), yields_without_links: true, goes_through_init: false }
+    }
+}
+
+impl StandbyOptions {
+    /// Sets [`StandbyOptions::sizes`].
+    #[must_use]
+    pub const fn with_sizes(mut self, sizes: MasterSizes) -> StandbyOptions {
+        self.sizes = sizes;
+        self
+    }
+
+    /// Sets [`StandbyOptions::goes_through_init`].
+    #[must_use]
+    pub const fn with_goes_through_init(mut self, goes: bool) -> StandbyOptions {
+        self.goes_through_init = goes;
+        self
+    }
+
+    /// Sets [`StandbyOptions::yields_without_links`].
+    #[must_use]
+    pub const fn with_yields_without_links(mut self, yields: bool) -> StandbyOptions {
+        self.yields_without_links = yields;
+        self
+    }
+}

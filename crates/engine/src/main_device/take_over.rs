@@ -1,0 +1,145 @@
+//! The acyclic half follows the role that the cyclic half has taken: it adopts a running bus, or ends all that runs
+//! (protocol MR-16, MR-17).
+
+use alloc::rc::Rc;
+use alloc::vec::Vec;
+
+use ringcat_wire::al::AlState;
+
+use super::MainDevice;
+use crate::board::live::{Life, Presence};
+use crate::declared::SubDeviceId;
+use crate::event::{Event, StandbyEvent};
+use crate::knowledge::{Handover, KnownMailbox};
+use crate::mail::InUse;
+use crate::procedures::error_statistics::ErrorStatistics;
+use crate::procedures::shared_segment::Beside;
+use crate::role::{MainDeviceRole, Partner, RoleCause, RoleRequest};
+use crate::segment::clocks::ClockObservation;
+use crate::segment::setup::Setup;
+use crate::segment::{Observation, StandbyObservation};
+use crate::time::Instant;
+
+impl MainDevice {
+    /// Follows a change of the role, and publishes what the other MainDevice needs. Without an application, requested
+    /// roles take effect here.
+    pub(super) fn follow_role(&mut self, now: Instant) {
+        if self.standby.is_none() {
+            return;
+        }
+        if self.active().is_none() {
+            self.take_request(now);
+        } else if self.role_followed != self.roles.changes() {
+            self.role_followed = self.roles.changes();
+            match self.role() {
+                MainDeviceRole::Active => self.take_over(),
+                MainDeviceRole::Inactive => self.yield_bus(now),
+            }
+            self.supervisor.poll(now);
+        }
+        self.publish_knowledge(now);
+    }
+
+    /// A requested role takes effect: there is no application whose cycles could take it.
+    fn take_request(&mut self, now: Instant) {
+        let role = match self.roles.take_request() {
+            Some(RoleRequest::Active) => MainDeviceRole::Active,
+            Some(RoleRequest::Inactive) => MainDeviceRole::Inactive,
+            Some(RoleRequest::HandOver) => {
+                let event = Event::Standby(StandbyEvent::HandOverRefused(Partner::Absent));
+                return self.supervisor.append_event(now, event, 0);
+            }
+            None => return,
+        };
+        if role != self.role() {
+            self.set_role(role);
+            let event = StandbyEvent::RoleChanged { role, cause: RoleCause::Requested };
+            self.supervisor.append_event(now, Event::Standby(event), 0);
+        }
+    }
+
+    /// The exchange goes on with the process data of the other MainDevice. The SubDevices stay as they are: none goes
+    /// through INIT, no address and no register of SyncManagers or FMMUs is written. What was known is compared with
+    /// the segment meanwhile; the first mail of each mailbox is as after a crash of its owner.
+    fn take_over(&mut self) {
+        let events = self.supervisor.take_events();
+        // The mirror of the other MainDevice ends.
+        self.renew(events);
+        let lives = self.lives();
+        self.learn_clocks();
+        self.adopt_mailboxes(&lives);
+        let is_hot = self.standby.as_ref().is_some_and(|standby| standby.words.is_hot());
+        let took_over = StandbyObservation::TookOver { lives: &lives, is_hot };
+        self.segment.observe(Observation::Standby(took_over));
+        let segment = self.segment.clone();
+        self.start_reconcile(segment);
+    }
+
+    /// Another MainDevice controls the bus: all procedures end. What is known of the segment stays.
+    fn yield_bus(&mut self, now: Instant) {
+        self.counted = self.counters();
+        self.number_cyclic_events(now);
+        let events = self.supervisor.take_events();
+        self.requests.end();
+        self.ports.clear();
+        self.gateway_queue = None;
+        self.renew(events);
+        self.segment.observe(Observation::Standby(StandbyObservation::Yielded));
+        self.begin_mirror();
+    }
+
+    /// Another supervisor with the model as it is.
+    fn renew(&mut self, events: crate::event::EventLog) {
+        let now = self.supervisor.bus().now();
+        self.renew_supervisor(events, now);
+        self.supervisor.order_link(self.disconnected.take());
+        let (bus, board) = (self.supervisor.bus(), self.segment.board.clone());
+        let count = self.segment.view().members().count();
+        let mailboxes = (0..count).map(|index| self.new_mailbox(SubDeviceId(index))).collect();
+        let statistics = ErrorStatistics::new(&bus, count, self.statistics_period);
+        self.statistics = Some(statistics.clone());
+        let beside = Beside { mailboxes, cache: self.cache.clone(), statistics };
+        self.segment = self.segment.without_application(&bus).with_application(&bus, board.clone(), beside);
+        self.supervisor.attach(board);
+        self.supervisor.attach_bell(self.requests.bell().clone());
+    }
+
+    /// The SubDevices as the other MainDevice has seen them last.
+    fn lives(&self) -> Vec<Life> {
+        let live = &self.segment.board.live;
+        (0..live.count()).map(|subdevice| live.life(subdevice).unwrap_or_default()).collect()
+    }
+
+    /// The last measurement of the clocks by the other MainDevice.
+    fn learn_clocks(&self) {
+        let known = self.heard_knowledge().and_then(|knowledge| knowledge.clocks);
+        if let Some(known) = known.filter(|_| self.segment.view().clocks().are_declared()) {
+            self.segment.observe_clocks(ClockObservation::Known(Rc::new(known)));
+        }
+    }
+
+    /// Uses the mailboxes that the other MainDevice has used.
+    fn adopt_mailboxes(&self, lives: &[Life]) {
+        for (index, life) in lives.iter().enumerate() {
+            let is_there = life.presence != Presence::Offline;
+            let has_left_init =
+                life.al_status & 0x0F >= AlState::PreOp as u8 && life.al_status & 0x0F != AlState::Boot as u8;
+            let (station, setup) = {
+                let view = self.segment.view();
+                let Some(member) = view.member(index) else { continue };
+                (member.station, member.setup.clone())
+            };
+            let Some(setup) = setup.filter(|_| is_there && has_left_init) else { continue };
+            if let (Some(in_use), Some(mailbox)) = (in_use(station, &setup), self.segment.mailbox(index)) {
+                mailbox.adopt(in_use, &KnownMailbox::default(), Handover::AfterCrash);
+            }
+        }
+    }
+}
+
+/// The mailbox of a SubDevice with a configuration. It may have mail.
+fn in_use(station: ringcat_wire::address::StationAddress, setup: &Setup) -> Option<InUse> {
+    let layout = setup.plan.mailbox_layout()?;
+    let [_, send] = &setup.plan.mailbox[..] else { return None };
+    Some(InUse { station, layout, send_manager: send.index, is_full: true })
+}

@@ -1,0 +1,192 @@
+//! The role of a MainDevice, and requests for another one, for all threads (protocol 9.6).
+//!
+//! A request takes effect at the next cycle: the half that runs the cycles takes it, and sets the role. The last
+//! request before a cycle counts.
+
+use alloc::sync::Arc;
+use core::fmt;
+use core::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, Ordering};
+
+use super::MainDeviceRole;
+
+/// What is requested of the role.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum RoleRequest {
+    /// It becomes ACTIVE with the next cycle, whatever the other MainDevice does.
+    Active,
+    /// It becomes INACTIVE with the next cycle, whether or not the other MainDevice takes over.
+    Inactive,
+    /// It becomes INACTIVE as soon as the other MainDevice goes on in the cycle after: no cycle is lost. Needs the
+    /// feature `standby`.
+    HandOver,
+}
+
+impl RoleRequest {
+    const fn code(self) -> u8 {
+        match self {
+            RoleRequest::Active => 1,
+            RoleRequest::Inactive => 2,
+            RoleRequest::HandOver => 3,
+        }
+    }
+
+    const fn from_code(code: u8) -> Option<RoleRequest> {
+        match code {
+            1 => Some(RoleRequest::Active),
+            2 => Some(RoleRequest::Inactive),
+            3 => Some(RoleRequest::HandOver),
+            _ => None,
+        }
+    }
+}
+
+/// Why the role has changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum RoleCause {
+    /// It was requested.
+    Requested,
+    /// The ACTIVE has handed its role over.
+    HandedOver,
+    /// All links of the ACTIVE were lost.
+    LinksLost,
+}
+
+impl fmt::Display for RoleCause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            RoleCause::Requested => "requested",
+            RoleCause::HandedOver => "handed over",
+            RoleCause::LinksLost => "all links lost",
+        })
+    }
+}
+
+#[derive(Debug)]
+struct Words {
+    /// 0 is ACTIVE, 1 is INACTIVE.
+    role: AtomicU8,
+    changes: AtomicU32,
+    request: AtomicU8,
+    /// Reasons of the application against a takeover, as bits.
+    not_ready: AtomicU16,
+}
+
+/// The role, and requests for another one; copies are handles to the same.
+#[derive(Clone, Debug)]
+pub struct RoleControl {
+    words: Arc<Words>,
+}
+
+impl Default for RoleControl {
+    fn default() -> RoleControl {
+        RoleControl::new(MainDeviceRole::Active)
+    }
+}
+
+impl RoleControl {
+    /// With a first role.
+    pub fn new(role: MainDeviceRole) -> RoleControl {
+        let words = Words {
+            role: AtomicU8::new(code(role)),
+            changes: AtomicU32::new(0),
+            request: AtomicU8::new(0),
+            not_ready: AtomicU16::new(0),
+        };
+        RoleControl { words: Arc::new(words) }
+    }
+
+    /// The role.
+    #[inline]
+    pub fn role(&self) -> MainDeviceRole {
+        match self.words.role.load(Ordering::Acquire) {
+            0 => MainDeviceRole::Active,
+            _ => MainDeviceRole::Inactive,
+        }
+    }
+
+    /// Number of changes of the role so far.
+    #[inline]
+    pub fn changes(&self) -> u32 {
+        self.words.changes.load(Ordering::Acquire)
+    }
+
+    /// Requests a role from the next cycle on. It replaces a request that has not taken effect.
+    pub fn request(&self, request: RoleRequest) {
+        self.words.request.store(request.code(), Ordering::Release);
+    }
+
+    /// The request that has not taken effect yet.
+    pub fn requested(&self) -> Option<RoleRequest> {
+        RoleRequest::from_code(self.words.request.load(Ordering::Acquire))
+    }
+
+    /// Whether there is a request. Cheap.
+    #[cfg(feature = "standby")]
+    #[inline]
+    pub(crate) fn is_requested(&self) -> bool {
+        self.words.request.load(Ordering::Relaxed) != 0
+    }
+
+    /// Takes the request: the cycle in which it takes effect begins.
+    #[cfg(any(test, feature = "standby"))]
+    pub(crate) fn take_request(&self) -> Option<RoleRequest> {
+        RoleRequest::from_code(self.words.request.swap(0, Ordering::AcqRel))
+    }
+
+    /// Sets the role; false if it is that already. For the half that runs the cycles.
+    pub(crate) fn set(&self, role: MainDeviceRole) -> bool {
+        let is_another = self.words.role.swap(code(role), Ordering::AcqRel) != code(role);
+        if is_another {
+            self.words.changes.fetch_add(1, Ordering::AcqRel);
+        }
+        is_another
+    }
+
+    /// Sets reasons against a takeover, as bits of `NotReady`: the application is not ready, or this MainDevice is to
+    /// stay INACTIVE.
+    pub fn set_not_ready(&self, bits: u16, set: bool) {
+        match set {
+            true => self.words.not_ready.fetch_or(bits, Ordering::Relaxed),
+            false => self.words.not_ready.fetch_and(!bits, Ordering::Relaxed),
+        };
+    }
+
+    /// These reasons.
+    pub fn not_ready(&self) -> u16 {
+        self.words.not_ready.load(Ordering::Relaxed)
+    }
+}
+
+const fn code(role: MainDeviceRole) -> u8 {
+    match role {
+        MainDeviceRole::Active => 0,
+        MainDeviceRole::Inactive => 1,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // covers: MR-01, MR-02, MR-03, standby
+    #[test]
+    fn the_last_request_counts_and_the_present_role_is_no_change() {
+        let control = RoleControl::new(MainDeviceRole::Inactive);
+        let handle = control.clone();
+        assert_eq!((control.role(), control.requested()), (MainDeviceRole::Inactive, None));
+        handle.request(RoleRequest::Active);
+        handle.request(RoleRequest::HandOver);
+        handle.request(RoleRequest::Inactive);
+        assert_eq!(control.role(), MainDeviceRole::Inactive, "before the next cycle");
+        assert_eq!(control.take_request(), Some(RoleRequest::Inactive));
+        assert_eq!((control.take_request(), control.requested()), (None, None));
+        assert!(!control.set(MainDeviceRole::Inactive) && control.changes() == 0);
+        assert!(control.set(MainDeviceRole::Active) && handle.changes() == 1);
+        assert_eq!(handle.role(), MainDeviceRole::Active);
+        handle.set_not_ready(0x50, true);
+        handle.set_not_ready(0x10, false);
+        assert_eq!(control.not_ready(), 0x40);
+    }
+}

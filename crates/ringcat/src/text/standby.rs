@@ -1,0 +1,40 @@
+//! Lines for events of MainDevice redundancy.
+
+use ringcat_engine::event::{Event, StandbyEvent};
+use ringcat_engine::role::MainDeviceRole;
+
+use super::names::address;
+
+pub(super) fn describe(event: &Event) -> Option<String> {
+    let Event::Standby(event) = event else { return None };
+    Some(match event {
+        StandbyEvent::RoleChanged { role: MainDeviceRole::Active, cause } => {
+            format!("ACTIVE ({cause}): this MainDevice controls the bus")
+        }
+        StandbyEvent::RoleChanged { role, cause } => format!("{role} ({cause}): this MainDevice sends nothing"),
+        StandbyEvent::TookOver { silence, in_state, is_hot } => {
+            let silence = silence.map_or_else(
+                || "no frame of another MainDevice has come".to_owned(),
+                |time| format!("the last cycle of the other MainDevice was {:.3} ms ago", time.as_secs_f64() * 1e3),
+            );
+            match is_hot {
+                true => format!("taken over: {in_state} SubDevices go on as they are; {silence}"),
+                false => format!("taken over: all SubDevices are configured again from INIT on; {silence}"),
+            }
+        }
+        StandbyEvent::Partner(partner) => format!("the other MainDevice: {partner}"),
+        StandbyEvent::Collision { arrived_on, source } => {
+            format!("collision: another MainDevice sends, too: {} on {arrived_on}", address(*source))
+        }
+        StandbyEvent::ConfigurationDiffers { what, .. } => {
+            format!("the other MainDevice has another configuration: {what}")
+        }
+        StandbyEvent::OtherVersion { got, least } => format!(
+            "the other MainDevice has master frames of version {got}, readable from version {least} on: update this one"
+        ),
+        StandbyEvent::HandOverRefused(partner) => {
+            format!("the role was not handed over: the other MainDevice is {partner}")
+        }
+        _ => return None,
+    })
+}

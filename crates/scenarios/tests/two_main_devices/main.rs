@@ -1,0 +1,52 @@
+//! Two MainDevices at one ring: the INACTIVE follows, takes over without a SubDevice that notices, and is handed the
+//! role over (protocol 9.6 to 9.10).
+
+mod adoption;
+mod clocks;
+mod collisions;
+mod following;
+mod rows;
+mod taking_over;
+
+use std::time::Duration;
+
+use ringcat::standby::MasterSizes;
+use ringcat::standby::StandbyOptions;
+use ringcat::{Declaration, Scan, automatic};
+use ringcat_sim::cable::Host;
+use ringcat_sim::network::builder::SegmentBuilder;
+use ringcat_sim::network::{Network, NetworkOptions};
+use scenarios::counting_allocator::CountingAllocator;
+use scenarios::segments::{descriptions, devices};
+use scenarios::two::CYCLE;
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
+
+const KINDS: [&str; 8] = [
+    "coupler",
+    "digital-output-8",
+    "digital-input-8",
+    "servo",
+    "emulated-output-8",
+    "analog-input-4",
+    "digital-output-16",
+    "block",
+];
+
+/// A ring through both; the line begins at the main link of `near`.
+fn ring_of_two(count: usize, near: Host) -> Network {
+    let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10));
+    let kinds: Vec<&str> = KINDS.into_iter().cycle().take(count).collect();
+    SegmentBuilder::ring_of_two(devices(descriptions(&kinds)), near).options(options).build().expect("the cables fit")
+}
+
+fn declare(scan: &Scan) -> Declaration {
+    automatic(&scan.subdevices, CYCLE)
+}
+
+fn standby() -> StandbyOptions {
+    let mut sizes = MasterSizes::default();
+    (sizes.to_inactive, sizes.to_active) = (8, 8);
+    StandbyOptions::default().with_sizes(sizes)
+}
