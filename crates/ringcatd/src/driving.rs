@@ -128,10 +128,10 @@ impl Driving {
     }
 }
 
-/// Waits until no SubDevice changes its state any more: after the end of an application, or when they have just got
-/// power, they are on their way to PREOP, and what leads them there is not interrupted. An application
-/// reaches OP without it, since its activation leads each SubDevice on from where it is; one that asks for mailboxes
-/// first finds them in use.
+/// Waits until no SubDevice changes its state any more, and until the PDOs of dictionaries are read that are about to be:
+/// after the end of an application, or when they have just got power, they are on their way to PREOP, and what leads
+/// them there is not interrupted. An application reaches OP without it, since its activation leads each SubDevice on
+/// from where it is; one that asks for mailboxes first finds them in use.
 fn wait_until_settled(supervisor: &SupervisorThread) {
     let settled = AlState::PreOp.code();
     let (begin, mut last, mut since) = (Instant::now(), 0, Instant::now());
@@ -140,8 +140,9 @@ fn wait_until_settled(supervisor: &SupervisorThread) {
             (last, since) = (seen.al_states, Instant::now());
         }
         // Some may be in a safe state, or in an error that nothing ends.
-        let is_still = since.elapsed() >= STILL || begin.elapsed() >= SETTLE;
-        if seen.al_states == settled || seen.responding() == 0 || is_still {
+        let is_still = seen.al_states == settled || since.elapsed() >= STILL;
+        let is_reading = || supervisor.with(|engine| engine.are_pdos_awaited()).unwrap_or(false);
+        if seen.responding() == 0 || begin.elapsed() >= SETTLE || is_still && !is_reading() {
             return;
         }
         std::thread::sleep(LOOK);

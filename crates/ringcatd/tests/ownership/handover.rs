@@ -18,6 +18,8 @@ const BAR: Duration = Duration::from_millis(20);
 #[test]
 fn a_bus_of_100_subdevices_is_taken_over_within_20_ms_without_a_scan() {
     let bench = Bench::start(100);
+    // The first hand-over waits until the daemon has read all dictionaries.
+    bench.take().release().expect("the daemon takes it");
     let mut times = Vec::new();
     for _ in 0..21 {
         let begin = Instant::now();
