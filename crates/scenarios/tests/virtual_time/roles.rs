@@ -240,6 +240,11 @@ fn call_of_the_segment(engine: &mut Engine, function: Function) -> Option<Answer
             let denied = of_activation(engine.load(Declaration::new(CYCLE)));
             now(engine, denied)
         }
+        Function::Follow => {
+            let known = main_device().knowledge().expect("it has scanned");
+            let denied = of_activation(engine.follow(Declaration::new(CYCLE), known, 1));
+            now(engine, denied)
+        }
         Function::Deactivate => {
             let result = engine.start_deactivate(LIMIT, at);
             now(engine, denial(&result))
@@ -314,6 +319,8 @@ fn each_function_is_refused_in_the_roles_and_phases_of_the_table_and_in_no_other
         let phase = Services::phase(&mut application);
         assert_eq!(phase, MainDevicePhase::Operation);
         application.engine_mut().set_role(role);
+        // INACTIVE ends the application.
+        let phase = application.engine_mut().phase();
         let pending = call(application.engine_mut(), function);
         let denied = application.cycle_until(pending, Duration::from_secs(5), |_| ());
         let denied = denied.unwrap_or_else(|error| panic!("{function:?} in {phase:?}: {error}"));
