@@ -240,11 +240,6 @@ fn call_of_the_segment(engine: &mut Engine, function: Function) -> Option<Answer
             let denied = of_activation(engine.load(Declaration::new(CYCLE)));
             now(engine, denied)
         }
-        Function::Follow => {
-            let known = main_device().knowledge().expect("it has scanned");
-            let denied = of_activation(engine.follow(Declaration::new(CYCLE), known, 1));
-            now(engine, denied)
-        }
         Function::Deactivate => {
             let result = engine.start_deactivate(LIMIT, at);
             now(engine, denial(&result))
@@ -279,6 +274,16 @@ fn call_of_the_segment(engine: &mut Engine, function: Function) -> Option<Answer
     })
 }
 
+/// What only an INACTIVE may do.
+fn call_of_an_inactive(engine: &mut Engine, function: Function) -> Option<Answer> {
+    if function != Function::Follow {
+        return None;
+    }
+    let known = main_device().knowledge().expect("it has scanned");
+    let denied = of_activation(engine.follow(Declaration::new(CYCLE), known, 1));
+    Some(now(engine, denied))
+}
+
 fn of_activation<T>(result: Result<T, ActivateError>) -> Option<NotPermitted> {
     if let Err(ActivateError::NotPermitted(denied)) = result { Some(denied) } else { None }
 }
@@ -288,7 +293,8 @@ fn call(engine: &mut Engine, function: Function) -> Answer {
     let called = call_of_mail(engine, function)
         .or_else(|| call_of_states(engine, function))
         .or_else(|| call_of_registers(engine, function))
-        .or_else(|| call_of_the_segment(engine, function));
+        .or_else(|| call_of_the_segment(engine, function))
+        .or_else(|| call_of_an_inactive(engine, function));
     called.unwrap_or_else(|| panic!("{function:?} has no call here"))
 }
 
