@@ -274,6 +274,16 @@ fn call_of_the_segment(engine: &mut Engine, function: Function) -> Option<Answer
     })
 }
 
+/// What only an INACTIVE may do.
+fn call_of_an_inactive(engine: &mut Engine, function: Function) -> Option<Answer> {
+    if function != Function::Follow {
+        return None;
+    }
+    let known = main_device().knowledge().expect("it has scanned");
+    let denied = of_activation(engine.follow(Declaration::new(CYCLE), known, 1));
+    Some(now(engine, denied))
+}
+
 fn of_activation<T>(result: Result<T, ActivateError>) -> Option<NotPermitted> {
     if let Err(ActivateError::NotPermitted(denied)) = result { Some(denied) } else { None }
 }
@@ -283,7 +293,8 @@ fn call(engine: &mut Engine, function: Function) -> Answer {
     let called = call_of_mail(engine, function)
         .or_else(|| call_of_states(engine, function))
         .or_else(|| call_of_registers(engine, function))
-        .or_else(|| call_of_the_segment(engine, function));
+        .or_else(|| call_of_the_segment(engine, function))
+        .or_else(|| call_of_an_inactive(engine, function));
     called.unwrap_or_else(|| panic!("{function:?} has no call here"))
 }
 
@@ -314,6 +325,8 @@ fn each_function_is_refused_in_the_roles_and_phases_of_the_table_and_in_no_other
         let phase = Services::phase(&mut application);
         assert_eq!(phase, MainDevicePhase::Operation);
         application.engine_mut().set_role(role);
+        // INACTIVE ends the application.
+        let phase = application.engine_mut().phase();
         let pending = call(application.engine_mut(), function);
         let denied = application.cycle_until(pending, Duration::from_secs(5), |_| ());
         let denied = denied.unwrap_or_else(|error| panic!("{function:?} in {phase:?}: {error}"));
