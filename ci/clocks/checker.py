@@ -139,15 +139,15 @@ class Checker:
 
     def compute(self, offsets):
         """Processing units' delays by station, from all latches of a run: without the last one where `offsets` were
-        written, which serves these alone, and without the first one, which belongs to a scan of the cabling that may
-        have been repeated. Earlier measurements count too: the delay of a cable does not change."""
+        written, which serves these alone, and with and without the first one, which belongs to a scan of the cabling
+        that may have been repeated. Earlier measurements count too: the delay of a cable does not change."""
         results = []
         for number, (latches, ports, parts) in enumerate(self.group):
             whole = [latch for latch in (self.complete(latch) for latch in latches) if latch]
             if whole:
                 self.local = {station: times[4] for station, times in whole[-1].items()}
             chosen = whole[:-1] if offsets and number == len(self.group) - 1 else whole
-            for chosen in (chosen,) if offsets else (chosen[1:], chosen):
+            for chosen in (chosen[1:], chosen):
                 # One latch of a SubDevice that came back measures nothing.
                 if len(chosen) > 1 or (chosen and not self.units):
                     results.append(self.measure(chosen, ports, parts))
