@@ -81,7 +81,8 @@ fn each_level_reports_its_messages_from_the_call_that_sets_it() {
         // Level 2: also each acyclic frame, byte for byte.
         main_device.set_log_filter(LogFilter::new(LogLevel::from_number(2)));
         frames.take();
-        main_device.attend(Duration::from_millis(50));
+        // A frame each 20 ms has the broadcast and the states.
+        main_device.attend(Duration::from_millis(100));
         let since = main_device.messages_since(since.next);
         let passed = frames.take();
         assert_eq!(in_messages(&since.messages), on_the_links(&passed));
