@@ -144,7 +144,7 @@ figures() {
 
 # The README's first command, and the size of the program that a release has.
 demo() {
-    local program=${CARGO_TARGET_DIR:-target}/release/ringcat bytes most=6800000
+    local program=${CARGO_TARGET_DIR:-target}/release/ringcat bytes most=9600000
     cargo run --release
     bytes=$(stat --format %s "$program")
     echo "$program has $bytes bytes, at most $most may be; without symbols $(without_symbols "$program")"
