@@ -4,7 +4,7 @@
 //! Input: the tree. Output: a line for each item: what the crate root re-exports, public types with their fields,
 //! variants and derived traits, traits with their items, public functions, and the traits that types implement. For
 //! what is re-exported of a lower crate, the module `handed_on` adds the same lines. Of macros, the list has the public
-//! items in the body and each part of the calls ([`macros`]). Items of private modules are listed where they are
+//! items in the body and each part of the calls (`macros`). Items of private modules are listed where they are
 //! public, also if the crate root does not name them. Private traits and types have no lines.
 
 mod items;

@@ -6,7 +6,7 @@
 pub struct LinkCounters {
     /// Frames that the kernel accepted for sending.
     pub sent: u64,
-    /// Frames returned by [`PacketSocket::receive`].
+    /// Frames returned by [`PacketSocket::receive`](super::PacketSocket::receive).
     pub received: u64,
     /// Frames not sent because the interface was down or gone.
     pub down: u64,

@@ -18,7 +18,7 @@ impl<'a> SendingSide<'a> {
         SendingSide { fd, counters }
     }
 
-    /// As [`PacketSocket::send`].
+    /// As [`PacketSocket::send`](super::PacketSocket::send).
     #[inline(always)]
     pub fn send(&mut self, frame: &[u8]) -> bool {
         let result = kernel::send(self.fd.as_raw_fd(), frame);
