@@ -1,8 +1,9 @@
 //! Which SubDevices have had no station address since power-on: no MainDevice has written their dictionaries since.
 
+use alloc::vec;
 use alloc::vec::Vec;
 
-use ringcat_wire::address::{Position, StationAddress};
+use ringcat_wire::address::{Position, StationAddress, Wkc};
 use ringcat_wire::register::map;
 
 use super::stations::station_at;
@@ -19,6 +20,16 @@ pub(super) struct PowerOns {
 impl PowerOns {
     /// Reads the station addresses before others are given. What cannot be read counts as written.
     pub async fn read(&mut self, bus: &Bus, count: u16) -> Vec<PdoSource> {
+        let sources = match all_are_fresh(bus, count).await {
+            true => vec![PdoSource::Sii; count.into()],
+            false => self.read_each(bus, count).await,
+        };
+        let fresh = (0..).zip(&sources).filter(|(_, source)| source.is_of_power_on());
+        self.given = fresh.map(|(position, _)| station_at(Position(position))).collect();
+        sources
+    }
+
+    async fn read_each(&self, bus: &Bus, count: u16) -> Vec<PdoSource> {
         let read = bus.gather((0..count).map(Position), |bus, position| async move {
             let bytes = bus.aprd(position, map::STATION_ADDRESS, 2).await.ok()?;
             Some(StationAddress(u16::from_le_bytes([*bytes.first()?, *bytes.get(1)?])))
@@ -30,9 +41,12 @@ impl PowerOns {
             Some(station) if self.given.contains(&station) && is_unique(station) => PdoSource::Sii,
             Some(_) | None => PdoSource::Outdated,
         };
-        let sources: Vec<PdoSource> = stations.iter().map(source).collect();
-        let fresh = (0..).zip(&sources).filter(|(_, source)| source.is_of_power_on());
-        self.given = fresh.map(|(position, _)| station_at(Position(position))).collect();
-        sources
+        stations.iter().map(source).collect()
     }
+}
+
+/// Whether the addresses of all SubDevices are 0, which one datagram says: most scans follow power-on.
+async fn all_are_fresh(bus: &Bus, count: u16) -> bool {
+    let ored = bus.brd(map::STATION_ADDRESS, 2).await;
+    ored.is_ok_and(|ored| ored.wkc() == Wkc(count) && ored.data.iter().all(|byte| *byte == 0))
 }
