@@ -26,8 +26,8 @@ type Tried<T> = Result<T, String>;
 const COUNTED: u64 = 500;
 /// Period of the CPU time measurement, and under valgrind.
 const PERIOD_US: u64 = 1_000;
-/// Period of two threads with 50 servos under valgrind. Nothing in a cycle depends on it, but valgrind cannot keep up
-/// with 1 ms there: frames are late, and late cycles take longer ways (1,093 to 1,329 instructions at 1 ms).
+/// Period of two threads under valgrind. Nothing in a cycle depends on it, but valgrind cannot keep up with 1 ms there:
+/// frames are late, and late cycles take longer ways (50 servos: 1,093 to 1,329 instructions at 1 ms).
 const SLOW_PERIOD_US: u64 = 4_000;
 /// Delay of a frame in the simulated segment under valgrind: longer than the rest of its cycle.
 const RESIDENCE_NS: u64 = 300_000;
@@ -137,7 +137,7 @@ fn instructions(namespaces: &Namespaces) -> Tried<bool> {
         let hop_ns = RESIDENCE_NS / servos as u64;
         let run = || {
             let _simulator = simulate(namespaces, servos, hop_ns)?;
-            profile(namespaces, servos, threads, "never")
+            profile(namespaces, threads, "never")
         };
         let mut best = run()?;
         for _ in 1..RUNS {
@@ -162,7 +162,7 @@ fn instructions(namespaces: &Namespaces) -> Tried<bool> {
         }
         let again = {
             let _simulator = simulate(namespaces, servos, hop_ns)?;
-            profile(namespaces, servos, threads, "always")?
+            profile(namespaces, threads, "always")?
         };
         figures.show("   with lost frames sent again (an option)", format!("{:.0} instructions", per_cycle(&again)));
         profiles.push((format!("{name}, lost frames sent again"), again));
@@ -190,7 +190,7 @@ fn period_us(threads: &str) -> u64 {
     if threads == "two" { SLOW_PERIOD_US } else { PERIOD_US }
 }
 
-fn profile(namespaces: &Namespaces, servos: usize, threads: &str, resend: &str) -> Tried<Profile> {
+fn profile(namespaces: &Namespaces, threads: &str, resend: &str) -> Tried<Profile> {
     let period_us = period_us(threads).to_string();
     let arguments = [threads, "block", &period_us, &COUNTED.to_string(), resend].map(str::to_owned);
     profile_program_within(namespaces.near("valgrind"), &[WITHIN], &beside("cycle_process")?, &arguments).map_err(said)

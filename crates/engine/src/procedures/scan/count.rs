@@ -16,7 +16,7 @@ use crate::time::Instant;
 const PAUSE: Duration = Duration::from_millis(1);
 
 /// Pause between two counts while EEPROMs are read.
-const WATCH_PAUSE: Duration = Duration::from_millis(20);
+const WATCH_PAUSE: Duration = Duration::from_millis(15);
 /// Consecutive counts without an answer after which no SubDevice is connected.
 const SILENT: u32 = 3;
 
