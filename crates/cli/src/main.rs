@@ -8,6 +8,7 @@ mod clock_options;
 mod clocks;
 mod compare;
 mod demo;
+mod doctor;
 mod ending;
 mod eni_summary;
 mod esi;
@@ -29,6 +30,7 @@ mod sim;
 #[cfg(feature = "standby")]
 mod standby;
 mod surroundings;
+mod svg;
 mod table;
 mod thread;
 mod times;
@@ -118,6 +120,10 @@ enum Command {
     ///
     /// Which SubDevices answer on which interface, where the ring is broken, errors of each cable. It only reads.
     Ring(ring::RingArguments),
+    /// Shows what on this machine would hurt a MainDevice, and what mends it
+    ///
+    /// Interfaces, kernel, processors, permissions, another MainDevice; how late a thread wakes up. It changes nothing.
+    Doctor(doctor::DoctorArguments),
     /// Synchronizes the distributed clocks and shows their differences
     Clocks(clocks::ClocksArguments),
     /// Records what passes on network interfaces into a file for Wireshark
@@ -173,6 +179,7 @@ fn main() -> ExitCode {
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Run(arguments) => run::run(&arguments),
         Command::Ring(arguments) => ring::run(&arguments),
+        Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Clocks(arguments) => clocks::run(&arguments),
         Command::Capture(arguments) => capture::run(&arguments),
         #[cfg(feature = "standby")]
@@ -197,6 +204,7 @@ impl Command {
             Command::Compare(_) => "compare",
             Command::Run(_) => "run",
             Command::Ring(_) => "ring",
+            Command::Doctor(_) => "doctor",
             Command::Clocks(_) => "clocks",
             Command::Capture(_) => "capture",
             #[cfg(feature = "standby")]
