@@ -90,10 +90,10 @@ impl DoctorArguments {
 pub fn run(arguments: &DoctorArguments) -> Result<Report, Failure> {
     arguments.check()?;
     let lasts = Duration::from_secs(u64::from(arguments.latency));
-    // An unwritable file shows before the measurement.
-    let picture = arguments.svg.as_ref().map(|path| Picture::create(path)).transpose()?;
     let end = EndRequest::watch(Some(arguments.priority))?;
     let mut findings = look_at(&Machine, &arguments.names())?;
+    // An unwritable file shows before the measurement.
+    let picture = arguments.svg.as_ref().map(|path| Picture::create(path)).transpose()?;
     let latency = match arguments.latency {
         0 => None,
         seconds => {

@@ -54,6 +54,8 @@ First steps:
   ringcat                              a demonstration on a simulated ring:
                                        no network, no permission
   ip link                              the network interfaces of this computer
+  ringcat doctor --main eth1           what on this computer would hurt, and
+                                       what mends it
   ringcat scan --main eth1             the SubDevices on the cable in eth1
   ringcat run --main eth1 --for 10s
                                        all SubDevices to OP, ten seconds of

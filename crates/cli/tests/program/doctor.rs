@@ -68,6 +68,25 @@ fn the_text_of_the_doctor_has_80_columns_the_worst_first_and_sums_up_last() {
     }
 }
 
+// covers: bench, verdict
+#[test]
+fn what_the_doctor_cannot_do_is_refused_before_it_measures() {
+    for (line, expected) in [
+        ("doctor --main no-such", "there is no network interface \"no-such\""),
+        ("doctor --main lo --redundant lo", "--main and --redundant name one interface, lo"),
+        ("doctor --redundant lo", "the following required arguments were not provided: --main <IF>"),
+        ("doctor --latency 0 --svg x.svg", "--svg draws what --latency measures"),
+        ("doctor --svg /no/such/x.svg", "/no/such/x.svg cannot be written: No such file or directory"),
+        ("doctor --latency 1h", "invalid value '1h' for '--latency <SECONDS>': expected a number from 0 to 86400"),
+    ] {
+        let output = ringcat(line);
+        let errors = text(&output.stderr);
+        let last = errors.lines().last().unwrap_or_default();
+        assert_eq!(output.status.code(), Some(2), "{line}: {errors}");
+        assert!(last.starts_with(&format!("result: FAILED: {expected}")), "{line}: {errors}");
+    }
+}
+
 // covers: bench
 #[test]
 fn the_page_of_the_doctor_explains_each_finding() {
