@@ -6,10 +6,8 @@
 mod plot;
 mod table;
 
-use std::fs::File;
-use std::io::Write;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -29,6 +27,7 @@ use crate::interfaces::now;
 use crate::json::data::Data;
 use crate::output::{counted, say, warn, write_event};
 use crate::run_log::{RunLog, Shown};
+use crate::svg::Picture;
 use crate::times::{cycle, time};
 use crate::verdict::{Report, Verdict};
 use plot::{Course, plot};
@@ -113,7 +112,7 @@ pub fn run(arguments: &ClocksArguments) -> Result<Report, Failure> {
     let cyclic_status = cycles.cyclic_status_handle();
     if let Some(picture) = &mut picture {
         reasons.extend(picture.draw(&plot(&course, &clocks)).err());
-        say!("differences over time: {}", picture.path.display());
+        say!("differences over time: {picture}");
     }
     let application = cycles.end().unwrap_or_else(|panicked| {
         reasons.push(panicked.to_string());
@@ -168,27 +167,6 @@ fn reasons(clocks: &[ClockStatus], locked: bool, settled: bool) -> Vec<String> {
         reasons.push("not all SubDevices are in OP".to_owned());
     }
     reasons
-}
-
-/// The file for the picture, made before anything is measured.
-struct Picture {
-    path: PathBuf,
-    file: File,
-}
-
-impl Picture {
-    fn create(path: &Path) -> Result<Picture, Failure> {
-        let file = File::create(path).map_err(|error| Failure::new(Picture::failed(path, &error)))?;
-        Ok(Picture { path: path.to_owned(), file })
-    }
-
-    fn draw(&mut self, picture: &str) -> Result<(), String> {
-        self.file.write_all(picture.as_bytes()).map_err(|error| Picture::failed(&self.path, &error))
-    }
-
-    fn failed(path: &Path, error: &std::io::Error) -> String {
-        format!("{} cannot be written: {error}", path.display())
-    }
 }
 
 struct Watch<'a> {

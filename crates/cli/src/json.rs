@@ -8,6 +8,7 @@ pub mod capture;
 pub mod clocks;
 pub mod data;
 pub mod demo;
+pub mod doctor;
 pub mod eni;
 pub mod esi;
 #[cfg(all(test, feature = "standby"))]

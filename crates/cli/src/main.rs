@@ -8,6 +8,7 @@ mod clock_options;
 mod clocks;
 mod compare;
 mod demo;
+mod doctor;
 mod ending;
 mod eni_summary;
 mod esi;
@@ -29,6 +30,7 @@ mod sim;
 #[cfg(feature = "standby")]
 mod standby;
 mod surroundings;
+mod svg;
 mod table;
 mod thread;
 mod times;
@@ -52,6 +54,8 @@ First steps:
   ringcat                              a demonstration on a simulated ring:
                                        no network, no permission
   ip link                              the network interfaces of this computer
+  ringcat doctor --main eth1           what on this computer would hurt, and
+                                       what mends it
   ringcat scan --main eth1             the SubDevices on the cable in eth1
   ringcat run --main eth1 --for 10s
                                        all SubDevices to OP, ten seconds of
@@ -118,6 +122,10 @@ enum Command {
     ///
     /// Which SubDevices answer on which interface, where the ring is broken, errors of each cable. It only reads.
     Ring(ring::RingArguments),
+    /// Shows what on this machine would hurt a MainDevice, and what mends it
+    ///
+    /// Interfaces, kernel, processors, permissions, another MainDevice; how late a thread wakes up. It changes nothing.
+    Doctor(doctor::DoctorArguments),
     /// Synchronizes the distributed clocks and shows their differences
     Clocks(clocks::ClocksArguments),
     /// Records what passes on network interfaces into a file for Wireshark
@@ -173,6 +181,7 @@ fn main() -> ExitCode {
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Run(arguments) => run::run(&arguments),
         Command::Ring(arguments) => ring::run(&arguments),
+        Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Clocks(arguments) => clocks::run(&arguments),
         Command::Capture(arguments) => capture::run(&arguments),
         #[cfg(feature = "standby")]
@@ -197,6 +206,7 @@ impl Command {
             Command::Compare(_) => "compare",
             Command::Run(_) => "run",
             Command::Ring(_) => "ring",
+            Command::Doctor(_) => "doctor",
             Command::Clocks(_) => "clocks",
             Command::Capture(_) => "capture",
             #[cfg(feature = "standby")]

@@ -3,13 +3,14 @@
 //! Input: names. Output: snapshots. Some calls wait for locks of the kernel; the cyclic thread must not use this
 //! module. All results are those of the calling thread's network namespace.
 
+pub mod ethtool;
 mod netlink;
 mod use_warning;
 
 use std::ffi::CStr;
 use std::os::fd::AsRawFd;
 
-pub use use_warning::{UseWarning, exclusive_use};
+pub use use_warning::{Unknown, UseWarning, Uses, exclusive_use, uses};
 
 use crate::error::LinkError;
 use crate::kernel;
@@ -39,6 +40,11 @@ pub fn list() -> Vec<Interface> {
     indexed_names().into_iter().filter_map(|(index, name)| describe(socket.as_raw_fd(), index, name)).collect()
 }
 
+/// The error for an interface that is missing; it names those that are there.
+pub fn missing(name: &str) -> LinkError {
+    LinkError::NoInterface { name: name.to_owned(), present: names() }
+}
+
 /// Whether an interface is up and has a link partner; None if there is no such interface or the driver does not report
 /// it. May wait milliseconds for a lock of the kernel.
 pub fn carrier(name: &str) -> Option<bool> {
@@ -55,7 +61,7 @@ pub fn switch(name: &str, up: bool) -> Result<(), LinkError> {
     let switched = kernel::request_socket().and_then(|socket| kernel::switch(socket.as_raw_fd(), name, up));
     switched.map_err(|errno| match errno {
         libc::EPERM | libc::EACCES => LinkError::MayNotSwitch { name: name.to_owned() },
-        libc::ENODEV => LinkError::NoInterface { name: name.to_owned(), present: names() },
+        libc::ENODEV => missing(name),
         errno => LinkError::from_errno(name, "switching it on or off", errno),
     })
 }

@@ -68,12 +68,6 @@ pub struct Statistics {
     pub drops: libc::c_uint,
 }
 
-#[repr(C)]
-struct EthtoolValue {
-    command: u32,
-    data: u32,
-}
-
 /// Error number of the last system call of this thread.
 pub fn errno() -> i32 {
     io::Error::last_os_error().raw_os_error().unwrap_or(0)
@@ -160,11 +154,22 @@ pub fn switch(fd: RawFd, name: &str, up: bool) -> Result<(), i32> {
 
 /// Whether the interface has a carrier (`ETHTOOL_GLINK`); an interface that is down has none.
 pub fn link_up(fd: RawFd, name: &str) -> Result<bool, i32> {
-    let mut value = EthtoolValue { command: ETHTOOL_GLINK, data: 0 };
+    ethtool(fd, name, ETHTOOL_GLINK).map(|answer| answer[1] != 0)
+}
+
+/// Words of an answer of a driver; more than each structure of a command has that is passed to [`ethtool`].
+pub const ETHTOOL_WORDS: usize = 64;
+
+/// What a driver answers to a command that reads (`ETHTOOL_G...`) a structure of a fixed size; the command is its first
+/// word.
+pub fn ethtool(fd: RawFd, name: &str, command: u32) -> Result<[u32; ETHTOOL_WORDS], i32> {
+    let mut words = [0; ETHTOOL_WORDS];
+    words[0] = command;
     let mut ifreq = named(name)?;
-    ifreq.ifr_ifru.ifru_data = std::ptr::from_mut(&mut value).cast();
-    // SAFETY: the ifreq and the value it points to live across the call; the kernel writes one integer of the value.
-    if unsafe { libc::ioctl(fd, libc::SIOCETHTOOL as _, &mut ifreq) } < 0 { Err(errno()) } else { Ok(value.data != 0) }
+    ifreq.ifr_ifru.ifru_data = words.as_mut_ptr().cast();
+    // SAFETY: the ifreq and the words it points to live across the call; the kernel writes one structure of integers
+    // and characters, which is shorter.
+    if unsafe { libc::ioctl(fd, libc::SIOCETHTOOL as _, &mut ifreq) } < 0 { Err(errno()) } else { Ok(words) }
 }
 
 /// A request for an interface with this name; `ENODEV` if the name is invalid.

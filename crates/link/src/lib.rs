@@ -59,6 +59,7 @@ pub use listener::{Listener, Sender};
 pub use packet_socket::binding::{PresentInterface, revoke};
 pub use packet_socket::handed::HandedSocket;
 pub use packet_socket::{LinkCounters, PacketOptions, PacketSocket, SendingSide};
+pub use permission::{may_write, setcap_command};
 pub use receive_mode::ReceiveMode;
 pub use recorder::{AlreadyRead, FrameNote, FrameReader, Recorder, RecorderError, Tap, Taps};
 pub use signals::{HeldSignals, Signal};

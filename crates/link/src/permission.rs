@@ -1,8 +1,12 @@
-//! The command that grants the running program raw frames, interfaces, locked memory and real-time priority.
+//! The command that grants the running program raw frames, interfaces, locked memory and real-time priority; whether it
+//! may write to a file.
 //!
 //! Output: one line for a shell with the path of the running file. Capabilities belong to a file, and a program that
 //! was built locally may not be on the PATH.
 
+use std::ffi::CString;
+use std::io;
+use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 
 /// The capabilities that the program needs, see `docs/links.md`.
@@ -23,6 +27,23 @@ fn for_program(program: &Path) -> String {
     format!("sudo setcap {CAPABILITIES} {word}")
 }
 
+/// Whether this process may write to a file or device, without opening it.
+///
+/// # Errors
+/// It is not there, or cannot be reached.
+pub fn may_write(path: &Path) -> io::Result<bool> {
+    let path = CString::new(path.as_os_str().as_bytes()).map_err(|_| io::Error::from(io::ErrorKind::NotFound))?;
+    // SAFETY: the pointer refers to a live null-terminated string.
+    if unsafe { libc::faccessat(libc::AT_FDCWD, path.as_ptr(), libc::W_OK, libc::AT_EACCESS) } == 0 {
+        return Ok(true);
+    }
+    let error = io::Error::last_os_error();
+    match error.raw_os_error() {
+        Some(libc::EACCES | libc::EPERM | libc::EROFS) => Ok(false),
+        _ => Err(error),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -41,5 +62,17 @@ mod tests {
         assert_eq!(line("/opt/ringcat-1.0/bin/ringcat").as_deref(), Some("/opt/ringcat-1.0/bin/ringcat"));
         assert_eq!(line("/home/a b/ringcat").as_deref(), Some("'/home/a b/ringcat'"));
         assert_eq!(line("/home/it's/ringcat").as_deref(), Some("'/home/it'\\''s/ringcat'"));
+    }
+
+    // covers: bench
+    #[test]
+    fn whether_a_file_may_be_written_is_known_without_opening_it() {
+        assert_eq!(may_write(Path::new("/dev/null")).ok(), Some(true));
+        // Root may write to more.
+        let opened = std::fs::File::options().write(true).open("/proc/version");
+        assert_eq!(may_write(Path::new("/proc/version")).ok(), Some(opened.is_ok()));
+        for missing in ["/no/such", "with\0end"] {
+            assert_eq!(may_write(Path::new(missing)).map_err(|e| e.kind()), Err(io::ErrorKind::NotFound), "{missing}");
+        }
     }
 }

@@ -137,10 +137,15 @@ pub fn precise_timers() {
 pub fn throttling() -> Option<RealtimeWarning> {
     let read = |name: &str| fs::read_to_string(format!("/proc/sys/kernel/{name}")).ok()?.trim().parse::<i64>().ok();
     let (runtime, period) = (read("sched_rt_runtime_us")?, read("sched_rt_period_us")?);
-    (runtime >= 0 && runtime < period).then(|| {
-        let what = format!("real-time threads that spin are stopped for {} of each {period} us", period - runtime);
-        RealtimeWarning::new(what, 0, "sudo sysctl kernel.sched_rt_runtime_us=-1")
-    })
+    let stopped = throttled_us(runtime, period)?;
+    let what = format!("real-time threads that spin are stopped for {stopped} of each {period} us");
+    Some(RealtimeWarning::new(what, 0, "sudo sysctl kernel.sched_rt_runtime_us=-1"))
+}
+
+/// For how long of each period real-time threads that spin are stopped, by `sched_rt_runtime_us` and
+/// `sched_rt_period_us`; `None` if they never are.
+pub fn throttled_us(runtime_us: i64, period_us: i64) -> Option<i64> {
+    (runtime_us >= 0 && runtime_us < period_us).then(|| period_us - runtime_us)
 }
 
 /// Limits the wake-up latency of all processors during the lifetime of this value.
@@ -177,6 +182,14 @@ mod tests {
         let nowhere = affinity(100_000).expect_err("there are not so many processors");
         assert!(nowhere.to_string().contains("processor 100000"), "{nowhere}");
         assert_eq!(nowhere.errno(), libc::EINVAL);
+    }
+
+    // covers: bench
+    #[test]
+    fn throttling_stops_threads_that_spin_for_the_rest_of_a_period() {
+        assert_eq!(throttled_us(950_000, 1_000_000), Some(50_000));
+        assert_eq!((throttled_us(-1, 1_000_000), throttled_us(1_000_000, 1_000_000)), (None, None));
+        assert_eq!(throttled_us(0, i64::MAX), Some(i64::MAX));
     }
 
     #[test]

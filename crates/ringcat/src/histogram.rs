@@ -30,6 +30,18 @@ impl Default for Histogram {
     }
 }
 
+/// How many times are within limits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Bucket {
+    /// The shortest time that is counted here.
+    pub begin: Duration,
+    /// Times that are counted here are shorter.
+    pub end: Duration,
+    /// How many.
+    pub count: u64,
+}
+
 fn get(word: &AtomicU64) -> u64 {
     word.load(Ordering::Relaxed)
 }
@@ -70,6 +82,16 @@ impl Histogram {
     /// Number of counted times.
     pub fn count(&self) -> u64 {
         self.buckets.iter().map(get).sum()
+    }
+
+    /// Counts of the times in each bucket that has some, from the shortest times to the longest.
+    pub fn buckets(&self) -> impl Iterator<Item = Bucket> + '_ {
+        let bucket = |(number, count): (usize, &AtomicU64)| Bucket {
+            begin: Duration::from_nanos(start_of(number)),
+            end: Duration::from_nanos(start_of(number + 1)),
+            count: get(count),
+        };
+        self.buckets.iter().enumerate().map(bucket).filter(|bucket| bucket.count > 0)
     }
 
     /// The shortest time.
@@ -157,5 +179,19 @@ mod tests {
         assert_eq!((histogram.shortest(), histogram.longest()), (Duration::from_micros(1), Duration::from_millis(1)));
         assert!(histogram.to_string().starts_with("min 1.0, 50 % "));
         assert_eq!(Histogram::default().quantile(500_000), Duration::ZERO);
+    }
+
+    // covers: bench
+    #[test]
+    fn buckets_hold_each_time_once_and_follow_each_other() {
+        let histogram = Histogram::default();
+        for ns in [0, 7, 8, 1_000, 1_001, 1_000_000, u64::MAX] {
+            histogram.record(Duration::from_nanos(ns));
+        }
+        let buckets: Vec<Bucket> = histogram.buckets().collect();
+        assert_eq!(buckets.iter().map(|bucket| bucket.count).sum::<u64>(), 7);
+        assert!(buckets.windows(2).all(|two| two[0].end <= two[1].begin));
+        assert!(buckets.iter().all(|bucket| bucket.begin < bucket.end), "{buckets:?}");
+        assert!(buckets.iter().any(|bucket| bucket.count == 2 && bucket.begin <= Duration::from_micros(1)));
     }
 }

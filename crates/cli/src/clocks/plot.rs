@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use ringcat::ClockStatus;
 
+use crate::svg;
+
 /// Samples that are kept; beyond, each second one is dropped, so that a long watch does not grow without bound.
 const MOST_SAMPLES: usize = 4_000;
 /// Size of the picture and of the margin for words, in pixels.
@@ -60,11 +62,7 @@ pub fn plot(course: &Course, clocks: &[ClockStatus]) -> String {
     let first = course.samples.first().map_or(0.0, |(at, _)| at.as_secs_f64());
     let last = course.samples.last().map_or(first + 1.0, |(at, _)| at.as_secs_f64()).max(first + 1e-3);
     let scale = Scale { first, last };
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" font-family=\"sans-serif\" \
-         font-size=\"11\" fill=\"#444\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n\
-         <text x=\"{MARGIN}\" y=\"20\" font-size=\"13\">Difference to the reference clock (0x092C) over time</text>\n"
-    );
+    let mut svg = svg::begin([WIDTH, HEIGHT], MARGIN, "Difference to the reference clock (0x092C) over time");
     grid(&mut svg, scale);
     for (number, clock) in clocks.iter().enumerate() {
         let path = line(course, number, scale);
@@ -79,7 +77,7 @@ pub fn plot(course: &Course, clocks: &[ClockStatus]) -> String {
         );
     }
     legend(&mut svg, clocks);
-    svg.push_str("</svg>\n");
+    svg.push_str(svg::END);
     svg
 }
 

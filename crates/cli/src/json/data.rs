@@ -6,6 +6,7 @@ use super::bench::{Cycles, Echo, Rate, RoundTrip};
 use super::capture::Capture;
 use super::clocks::Clocks;
 use super::demo::Demo;
+use super::doctor::Doctor;
 use super::eni::EniFile;
 use super::esi::{EsiDeclared, EsiList, EsiShow};
 use super::network::{Compare, Init};
@@ -28,6 +29,7 @@ pub enum Data {
     Run(Box<Run>),
     Ring(Ring),
     Clocks(Clocks),
+    Doctor(Doctor),
     Capture(Capture),
     Sim(Sim),
     #[cfg(feature = "standby")]

@@ -10,7 +10,7 @@ use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 use serde_json::Value;
 
-use super::{bench, capture, clocks, demo, eni, esi, line, network, ring, run, scan, sii, sim, standby};
+use super::{bench, capture, clocks, demo, doctor, eni, esi, line, network, ring, run, scan, sii, sim, standby};
 
 /// Lines around the tables.
 const BEGIN: &str =
@@ -92,6 +92,7 @@ fn all() -> Vec<(&'static str, Vec<Key>)> {
         ("`run`", keys::<run::Run>()),
         ("`ring`", keys::<ring::Ring>()),
         ("`clocks`", keys::<clocks::Clocks>()),
+        ("`doctor`", keys::<doctor::Doctor>()),
         ("`capture`", keys::<capture::Capture>()),
         ("`standby`", keys::<standby::Standby>()),
         ("`sim`", keys::<sim::Sim>()),

@@ -128,7 +128,9 @@ fn a_network_file_and_its_differences_are_printed_with_the_documented_keys() {
 fn the_output_of_each_command_on_the_page_is_checked_by_a_test() {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../");
     let read = |path: &str| std::fs::read_to_string(format!("{root}{path}")).expect("the file is there");
-    let tests = read("cli/tests/program/json.rs") + &read("scenarios/tests/on_the_wire/json.rs");
+    let tests = read("cli/tests/program/json.rs")
+        + &read("cli/tests/program/doctor.rs")
+        + &read("scenarios/tests/on_the_wire/json.rs");
     let page = read("../docs/json.md");
     let heading = |line: &str| Some(line.strip_prefix("### `")?.strip_suffix('`')?.to_owned());
     let commands: Vec<String> = page.lines().filter_map(heading).collect();
@@ -147,6 +149,7 @@ fn what_cannot_be_done_is_an_object_too() {
         "run --main no-such",
         "ring --main no-such",
         "clocks --main no-such",
+        "doctor --main no-such",
         "capture --main no-such --out /tmp/never.pcapng",
         "sim --main no-such --segment FILE",
         "standby --main no-such --redundant no-such-2",

@@ -2,6 +2,7 @@
 
 mod daemon;
 mod demo;
+mod doctor;
 mod documented;
 mod exit_codes;
 mod files;

@@ -100,32 +100,72 @@ impl fmt::Display for UseWarning {
 
 /// Other users of this interface. Empty for an interface that does not exist.
 pub fn exclusive_use(name: &str) -> Vec<UseWarning> {
+    uses(name).found
+}
+
+/// Other users of an interface, and what could not be looked at.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Uses {
+    /// What was found.
+    pub found: Vec<UseWarning>,
+    /// What the kernel did not tell: there may be more.
+    pub unknown: Vec<Unknown>,
+}
+
+/// A use of an interface that the kernel did not tell anything about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Unknown {
+    /// Addresses of the interface.
+    Addresses,
+    /// The bridge or bond that it is a member of.
+    Membership,
+    /// Sockets of other programs.
+    Sockets,
+    /// Kernel modules.
+    KernelModules,
+}
+
+/// As [`exclusive_use`], with what could not be looked at.
+pub fn uses(name: &str) -> Uses {
+    let mut uses = Uses::default();
     let Some(interface) = super::list().into_iter().find(|interface| interface.name == name) else {
-        return Vec::new();
+        return uses;
     };
-    let mut warnings: Vec<UseWarning> = addresses(name)
-        .into_iter()
-        .map(|address| UseWarning::Address { interface: name.to_owned(), address })
-        .collect();
-    warnings.extend(member(name, interface.index));
-    warnings.extend(sockets(name, interface.index));
-    warnings.extend(kernel_modules(&read("/proc/modules")).map(|module| UseWarning::KernelModule { module }));
+    let address = |address| UseWarning::Address { interface: name.to_owned(), address };
+    uses.note(Unknown::Addresses, addresses(name).map(|all| all.into_iter().map(address).collect()));
+    uses.note(Unknown::Membership, member(name, interface.index));
+    uses.note(Unknown::Sockets, sockets(name, interface.index));
+    let modules = fs::read_to_string("/proc/modules").ok();
+    let modules =
+        modules.map(|table| kernel_modules(&table).map(|module| UseWarning::KernelModule { module }).collect());
+    uses.note(Unknown::KernelModules, modules);
     if interface.mtu < 1500 {
-        warnings.push(UseWarning::SmallMtu { interface: name.to_owned(), mtu: interface.mtu });
+        uses.found.push(UseWarning::SmallMtu { interface: name.to_owned(), mtu: interface.mtu });
     }
-    warnings
+    uses
+}
+
+impl Uses {
+    fn note(&mut self, what: Unknown, found: Option<Vec<UseWarning>>) {
+        match found {
+            Some(found) => self.found.extend(found),
+            None => self.unknown.push(what),
+        }
+    }
 }
 
 fn read(path: &str) -> String {
     fs::read_to_string(path).unwrap_or_default()
 }
 
-fn addresses(name: &str) -> Vec<IpAddr> {
+/// Addresses of an interface; `None` if the kernel does not tell.
+fn addresses(name: &str) -> Option<Vec<IpAddr>> {
     let mut found = Vec::new();
     let mut list: *mut libc::ifaddrs = std::ptr::null_mut();
     // SAFETY: the pointer refers to a live variable for the list.
     if unsafe { libc::getifaddrs(&mut list) } != 0 {
-        return found;
+        return None;
     }
     let mut at = list;
     while !at.is_null() {
@@ -139,7 +179,7 @@ fn addresses(name: &str) -> Vec<IpAddr> {
     }
     // SAFETY: the list is freed once, after its last use.
     unsafe { libc::freeifaddrs(list) };
-    found
+    Some(found)
 }
 
 fn address(address: *const libc::sockaddr) -> Option<IpAddr> {
@@ -162,22 +202,24 @@ fn address(address: *const libc::sockaddr) -> Option<IpAddr> {
     }
 }
 
-fn member(name: &str, index: u32) -> Option<UseWarning> {
-    let controller = netlink::membership(index)?.controller?;
+/// The bridge or bond of an interface; `None` if the kernel does not respond.
+fn member(name: &str, index: u32) -> Option<Vec<UseWarning>> {
+    let Some(controller) = netlink::membership(index)?.controller else { return Some(Vec::new()) };
     let kind = netlink::membership(controller).map(|m| m.kind).filter(|kind| !kind.is_empty());
     let controller_name = super::list().into_iter().find(|i| i.index == controller).map(|i| i.name);
-    Some(UseWarning::Member {
+    Some(vec![UseWarning::Member {
         interface: name.to_owned(),
         controller: controller_name.unwrap_or_else(|| format!("with index {controller}")),
         kind: kind.unwrap_or_else(|| "interface".to_owned()),
-    })
+    }])
 }
 
-/// Packet sockets for EtherCAT on this interface that belong to other processes, one warning per process.
-fn sockets(name: &str, index: u32) -> Vec<UseWarning> {
-    let inodes = bound_inodes(&read("/proc/thread-self/net/packet"), index);
+/// Packet sockets for EtherCAT on this interface that belong to other processes, one warning per process;
+/// `None` if the kernel's table cannot be read.
+fn sockets(name: &str, index: u32) -> Option<Vec<UseWarning>> {
+    let inodes = bound_inodes(&fs::read_to_string("/proc/thread-self/net/packet").ok()?, index);
     if inodes.is_empty() {
-        return Vec::new();
+        return Some(Vec::new());
     }
     let own: HashSet<u64> = socket_inodes("self").collect();
     let mut owners: Vec<Option<(u32, String)>> = Vec::new();
@@ -187,7 +229,7 @@ fn sockets(name: &str, index: u32) -> Vec<UseWarning> {
             owners.push(owner);
         }
     }
-    owners.into_iter().map(|owner| UseWarning::Socket { interface: name.to_owned(), owner }).collect()
+    Some(owners.into_iter().map(|owner| UseWarning::Socket { interface: name.to_owned(), owner }).collect())
 }
 
 /// Inodes of the sockets in the kernel's table that are bound to EtherCAT and this interface.
