@@ -3,6 +3,7 @@
 //! Input: names. Output: snapshots. Some calls wait for locks of the kernel; the cyclic thread must not use this
 //! module. All results are those of the calling thread's network namespace.
 
+pub mod free;
 mod netlink;
 mod use_warning;
 
