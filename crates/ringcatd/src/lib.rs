@@ -3,8 +3,8 @@
 //! * [`conf`]: the configuration file; [`setup`]: what the daemon is to do, from the file and from options; [`check`]:
 //!   what of it was understood, in text; [`up_down`]: interfaces that are switched on and off with the daemon;
 //! * [`source`]: the links of a master as an option names them; [`device`]: a network interface, and where it is;
-//!   [`wires`]: opened anew for each owner; [`opened`]: as long as a process has them; [`opener`]: packet sockets from a
-//!   process of its own;
+//!   [`wires`]: opened anew for each owner; [`opened`]: as long as a process has them; [`opener`]: packet sockets from
+//!   a process of its own;
 //! * [`segment_process`]: a simulated segment in a process of its own;
 //! * [`master`]: a master with the process that drives it; [`driving`]: this daemon while it does;
 //! * [`ethernet`]: network interfaces of EoE, which outlast applications;

@@ -371,8 +371,8 @@ impl Master {
         }
     }
 
-    /// An interface that was not named, but chosen, is left alone when the host begins to use it. One that an application
-    /// drives stays: a machine may run with it.
+    /// An interface that was not named, but chosen, is left alone when the host begins to use it. One that an
+    /// application drives stays: a machine may run with it.
     fn leave_alone(&self) {
         if !matches!(&*locked(&self.driver), Driver::Daemon(..)) {
             return;

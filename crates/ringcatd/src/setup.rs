@@ -1,4 +1,4 @@
-//! What the daemon is to do: from options, and from a configuration file. An option counts before a variable of the file.
+//! What the daemon is to do: from options, and from a configuration file. An option counts before a variable.
 
 use std::path::PathBuf;
 
@@ -134,7 +134,8 @@ mod tests {
     // covers: service
     #[test]
     fn options_count_before_variables_and_defaults_behind_both() {
-        let text = "MASTER0_DEVICE=eth0\nRINGCAT_MODE=0664\nRINGCAT_STOP_LIMIT=7\nRINGCAT_EOE=yes\nRINGCAT_MASTER0_SAFE_STATE=INIT\n";
+        let text = "MASTER0_DEVICE=eth0\nRINGCAT_MODE=0664\nRINGCAT_STOP_LIMIT=7\nRINGCAT_EOE=yes\n\
+                    RINGCAT_MASTER0_SAFE_STATE=INIT\n";
         let conf = || Conf::from_bytes(text.as_bytes()).expect("it is right");
         let setup = Setup::new(Given::default(), conf()).expect("it fits");
         assert_eq!((setup.rights.mode, setup.stop_limit, setup.has_eoe), (0o664, 7, true));

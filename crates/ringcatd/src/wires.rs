@@ -167,8 +167,8 @@ impl Interfaces {
         Opened::interfaces(&devices, set)
     }
 
-    /// The first interface that is free is chosen once, and stays until it is left: after an application that has it the
-    /// daemon leads its SubDevices to their safe state in any case.
+    /// The first interface that is free is chosen once, and stays until it is left: after an application that has it
+    /// the daemon leads its SubDevices to their safe state in any case.
     fn settled(&mut self, device: Device) -> Result<Device, String> {
         if device != Device::First {
             return Ok(device);

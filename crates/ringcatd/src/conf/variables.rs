@@ -125,7 +125,8 @@ impl Reading {
             }
             Some(Variable::DeviceModules) if value.is_empty() => Ok("empty, and not needed".to_owned()),
             Some(Variable::DeviceModules) => Ok(format!(
-                "not needed: ringcatd uses interfaces with the drivers that they have; {value:?} is neither loaded nor replaced"
+                "not needed: ringcatd uses interfaces with the drivers that they have; {value:?} is neither loaded \
+                 nor replaced"
             )),
             Some(Variable::ModprobeFlags) => Ok("not needed: no kernel module is loaded".to_owned()),
             Some(Variable::UpDownInterfaces) => self.up_down(value),

@@ -15,7 +15,7 @@ use crate::bench::{Bench, ask};
 const SOCKET: &str = "RINGCAT_TEST_USER";
 /// The test that is that process.
 const TEST: &str = "users::each_mode_lets_root_members_and_strangers_do_what_its_bits_say";
-/// The group of the socket, and two users of whom one is in it.
+/// The group of the socket, a user in it and one that is not.
 const GROUP: u32 = 65_432;
 const MEMBER: u32 = 65_433;
 const STRANGER: u32 = 65_434;
