@@ -43,7 +43,8 @@ pub fn in_use(interface: &Interface) -> Option<String> {
     }
     let warnings = exclusive_use(name);
     if let Some(warning) = warnings.into_iter().find(|it| !matches!(it, UseWarning::SmallMtu { .. })) {
-        return Some(warning.to_string());
+        // Without its advice: nothing of the host is to be changed for an interface that was not named.
+        return warning.to_string().split(';').next().map(str::to_owned);
     }
     if has_route_v4(&read("/proc/thread-self/net/route"), name) {
         return Some(format!("the host has a route over it; ip route show dev {name}"));

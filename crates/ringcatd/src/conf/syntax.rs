@@ -4,7 +4,7 @@
 //! quotes, `\` and comments mean what they mean in `sh`, so a script can read the same file. Nothing is expanded: what
 //! `sh` would expand, or run, is a mistake with its name. Each byte is looked at a few times at most.
 
-use super::Mistake;
+use super::model::Mistake;
 
 /// Longest name of a variable.
 const LONGEST_NAME: usize = 64;

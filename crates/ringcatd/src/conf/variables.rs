@@ -8,8 +8,8 @@ mod own;
 
 use std::collections::{BTreeMap, HashMap};
 
+use super::model::{Conf, Mistake, Understood};
 use super::syntax::Assignment;
-use super::{Conf, Mistake, Understood};
 use crate::device::Device;
 use crate::source::{MasterOption, Source};
 
