@@ -54,7 +54,7 @@ mod tests {
     use super::*;
     use crate::setup::Given;
 
-    // covers: service
+    // covers: daemon
     #[test]
     fn what_was_understood_is_said_with_lines_and_the_state_of_interfaces() {
         let text = "\nMASTER0_DEVICE=no-such\nRINGCAT_MODE=0664\nRINGCAT_MASTER1_SIM=/srv/a.toml\n";

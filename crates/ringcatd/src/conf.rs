@@ -62,7 +62,7 @@ fn bytes(path: &Path) -> Result<Vec<u8>, String> {
 mod tests {
     use super::*;
 
-    // covers: service
+    // covers: daemon
     #[test]
     fn a_mistake_is_named_with_file_and_line_and_several_are_all_listed() {
         let text = "MASTER0_DEVICE=\"eth0 eth1\"\nRINGCAT_MODE=$MODE\n\nMASTER0_BACKUP=ff:ff:ff:ff:ff:ff\n";

@@ -162,7 +162,7 @@ fn first(others: &[Device]) -> Result<Found, String> {
 mod tests {
     use super::*;
 
-    // covers: service
+    // covers: daemon
     #[test]
     fn a_device_is_an_address_a_name_or_the_first() {
         let parse = |text: &str| text.parse::<Device>();
@@ -184,7 +184,7 @@ mod tests {
         }
     }
 
-    // covers: service
+    // covers: daemon
     #[test]
     fn the_loopback_and_interfaces_of_other_masters_are_never_the_first() {
         let others: Vec<Device> = interface::list().into_iter().map(|it| Device::Name(it.name)).collect();

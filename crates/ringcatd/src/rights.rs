@@ -126,7 +126,7 @@ mod tests {
         peer
     }
 
-    // covers: daemon, service
+    // covers: daemon
     #[test]
     fn a_mode_says_for_user_group_and_others_what_they_may() {
         use Right::{Change, Read};
@@ -148,7 +148,7 @@ mod tests {
         }
     }
 
-    // covers: daemon, service
+    // covers: daemon
     #[test]
     fn without_a_group_no_client_is_a_member() {
         let other = peer(effective_user() + 1, &[44]);

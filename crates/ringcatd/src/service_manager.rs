@@ -108,7 +108,7 @@ mod tests {
         ServiceManager::new(7, |wanted| all.iter().find(|(it, _)| *it == wanted).map(|(_, value)| value.into()))
     }
 
-    // covers: service
+    // covers: daemon
     #[test]
     fn states_are_sent_once_each_and_again_if_nothing_took_them() {
         let name = format!("ringcatd-notify-{}", std::process::id());
@@ -130,7 +130,7 @@ mod tests {
         assert!(received(&socket).len() < 100_000);
     }
 
-    // covers: service
+    // covers: daemon
     #[test]
     fn signs_of_life_are_sent_as_often_as_they_are_expected() {
         let path = std::env::temp_dir().join(format!("ringcatd-watchdog-{}", std::process::id()));

@@ -131,7 +131,7 @@ impl Setup {
 mod tests {
     use super::*;
 
-    // covers: service
+    // covers: daemon
     #[test]
     fn options_count_before_variables_and_defaults_behind_both() {
         let text = "MASTER0_DEVICE=eth0\nRINGCAT_MODE=0664\nRINGCAT_STOP_LIMIT=7\nRINGCAT_EOE=yes\n\

@@ -84,7 +84,7 @@ impl UpDown {
 mod tests {
     use super::*;
 
-    // covers: service
+    // covers: daemon
     #[test]
     fn an_interface_that_is_absent_is_waited_for_and_one_that_is_on_stays_so() {
         let lo = interface::list().into_iter().find(|it| it.loopback && it.up);

@@ -64,7 +64,7 @@ impl fmt::Display for Place {
 mod tests {
     use super::*;
 
-    // covers: service
+    // covers: daemon
     #[test]
     fn under_systemd_one_file_counts_and_without_it_the_other() {
         let root = std::env::temp_dir().join(format!("ringcatd-place-{}", std::process::id()));

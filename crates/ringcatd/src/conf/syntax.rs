@@ -241,7 +241,7 @@ mod tests {
         assignments(text).1.into_iter().map(|it| (it.line.expect("it has a line"), it.text)).collect()
     }
 
-    // covers: service
+    // covers: daemon
     #[test]
     fn assignments_have_the_values_that_sh_gives_them() {
         let text = "# a comment\n\nA=\"00:11\"\n  B='x y'  # behind\nC=\nD=a\"b c\"'d'e\n\tE=\"two\nlines\"\nF=a\\ b\n\
@@ -271,7 +271,7 @@ mod tests {
         assert_eq!(of_sh, expected.map(|(_, _, value)| value));
     }
 
-    // covers: service
+    // covers: daemon
     #[test]
     fn what_sh_would_expand_or_run_is_a_mistake_with_its_line() {
         let cases = [
@@ -304,7 +304,7 @@ mod tests {
         assert!(found[0].1.contains("at most 4096 bytes") && found[1].1.contains("NAME=VALUE"), "{found:?}");
     }
 
-    // covers: service
+    // covers: daemon
     #[test]
     fn all_mistakes_are_found_and_what_is_right_between_them_is_read() {
         let text = b"A=$1\nB=2\nC='open\nD=\"4\"\nE = 5\n";
@@ -314,7 +314,7 @@ mod tests {
         assert_eq!(wrong.iter().filter_map(|it| it.line).collect::<Vec<_>>(), [1, 3, 5]);
     }
 
-    // covers: service
+    // covers: daemon
     #[test]
     fn any_bytes_end_in_assignments_and_mistakes_soon() {
         let begin = std::time::Instant::now();

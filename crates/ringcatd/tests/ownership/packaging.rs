@@ -32,7 +32,7 @@ fn said(output: &Output) -> String {
     String::from_utf8_lossy(&[&output.stdout[..], &output.stderr].concat()).into_owned()
 }
 
-// covers: service
+// covers: daemon
 #[test]
 fn the_example_is_right_as_soon_as_it_names_a_master_whichever_line_is_used() {
     let example = text("ethercat.conf");
@@ -74,7 +74,7 @@ fn unit(directory: &Path) -> PathBuf {
     path
 }
 
-// covers: service
+// covers: daemon
 #[test]
 fn systemd_accepts_the_unit_and_finds_little_exposed() {
     let directory = directory();
@@ -92,7 +92,7 @@ fn systemd_accepts_the_unit_and_finds_little_exposed() {
     std::fs::remove_dir_all(directory).expect("it is there");
 }
 
-// covers: service
+// covers: daemon
 #[test]
 fn systemd_makes_the_group_and_the_directory_of_the_package() {
     let root = directory();
@@ -109,7 +109,7 @@ fn systemd_makes_the_group_and_the_directory_of_the_package() {
     std::fs::remove_dir_all(root).expect("it is there");
 }
 
-// covers: service
+// covers: daemon
 #[test]
 fn the_init_script_has_the_verbs_of_the_manual_and_its_header() {
     let script = text("ethercat.init");

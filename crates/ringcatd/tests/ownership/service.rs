@@ -50,7 +50,7 @@ fn file(directory: &Path, counts: &[usize], further: &str) -> String {
     path.to_str().expect("text").to_owned()
 }
 
-// covers: service
+// covers: daemon
 #[test]
 fn a_configuration_file_takes_the_place_of_options() {
     let (turn, directory) = (turn(), directory());
@@ -61,7 +61,7 @@ fn a_configuration_file_takes_the_place_of_options() {
     wait_for(&mut client, 1, 4);
 }
 
-// covers: service
+// covers: daemon
 #[test]
 fn the_program_ends_with_all_mistakes_of_its_file_and_changes_nothing() {
     let directory = directory();
@@ -77,7 +77,7 @@ fn the_program_ends_with_all_mistakes_of_its_file_and_changes_nothing() {
     std::fs::remove_dir_all(directory).expect("it is there");
 }
 
-// covers: service
+// covers: daemon
 #[test]
 fn a_check_says_what_was_understood_and_its_exit_code_whether_it_is_right() {
     let directory = directory();
@@ -114,7 +114,7 @@ fn a_check_says_what_was_understood_and_its_exit_code_whether_it_is_right() {
     std::fs::remove_dir_all(directory).expect("it is there");
 }
 
-// covers: service
+// covers: daemon
 #[test]
 fn the_service_manager_is_told_ready_state_life_and_end() {
     let (turn, directory) = (turn(), directory());
@@ -148,7 +148,7 @@ fn control(conf: &str, verb: &str) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8_lossy(&said).into_owned())
 }
 
-// covers: service
+// covers: daemon
 #[test]
 fn ethercatctl_starts_asks_restarts_and_stops_the_daemon() {
     let (_turn, directory) = (turn(), directory());

@@ -55,7 +55,7 @@ fn tries(bench: &Bench, user: u32, group: u32) -> String {
     found.1.to_owned()
 }
 
-// covers: daemon, service
+// covers: daemon
 #[test]
 fn each_mode_lets_root_members_and_strangers_do_what_its_bits_say() {
     if let Some(socket) = std::env::var_os(SOCKET) {

@@ -51,7 +51,7 @@ fn stays(bench: &Bench, what: &str, holds: impl Fn(&Bench) -> bool) {
 
 const FIRST: &str = "0=ff:ff:ff:ff:ff:ff";
 
-// covers: service
+// covers: daemon
 #[test]
 fn the_first_interface_is_none_that_the_host_uses_in_any_way() {
     let Some(mut bench) = Bench::make(LINE, &[1, 2, 3, 4, 5, 6]) else { return };
@@ -85,7 +85,7 @@ fn the_first_interface_is_none_that_the_host_uses_in_any_way() {
     assert_eq!(used(&bench), [index(&bench, "near0")]);
 }
 
-// covers: service
+// covers: daemon
 #[test]
 fn an_interface_that_was_chosen_is_left_when_the_host_begins_to_use_it() {
     let Some(mut bench) = Bench::make(LINE, &[0]) else { return };
@@ -121,7 +121,7 @@ fn carriers(bench: &Bench) -> Vec<Option<bool>> {
     }
 }
 
-// covers: service, links
+// covers: daemon, links
 #[test]
 fn links_are_found_by_their_address_whatever_their_name_is() {
     let Some(mut bench) = Bench::make(RING, &[0]) else { return };
@@ -144,7 +144,7 @@ fn links_are_found_by_their_address_whatever_their_name_is() {
     bench.wait_for(AlState::PreOp);
 }
 
-// covers: service
+// covers: daemon
 #[test]
 fn interfaces_are_switched_with_the_daemon_but_not_under_an_application() {
     let Some(mut bench) = Bench::make(RING, &[0, 1]) else { return };

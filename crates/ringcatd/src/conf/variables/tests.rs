@@ -22,7 +22,7 @@ fn meaning(conf: &Conf, name: &str) -> String {
     conf.understood.iter().find(|it| it.name == name).expect(name).text.clone()
 }
 
-// covers: service
+// covers: daemon
 #[test]
 fn masters_are_on_addresses_names_the_first_interface_and_rings() {
     let text = "MASTER0_DEVICE=\"00:00:08:44:ab:66\"\nMASTER1_DEVICE=eth1\nMASTER1_BACKUP=00:00:08:44:AB:67\n\
@@ -35,7 +35,7 @@ fn masters_are_on_addresses_names_the_first_interface_and_rings() {
     assert_eq!(meaning(&conf, "MASTER3_DEVICE"), "empty: no master");
 }
 
-// covers: service
+// covers: daemon
 #[test]
 fn each_variable_of_the_manual_is_honoured_or_explained() {
     let conf = read(
@@ -50,7 +50,7 @@ fn each_variable_of_the_manual_is_honoured_or_explained() {
     assert_eq!(read("MASTER0_DEVICE=eth0\nUPDOWN_INTERFACES=\" \"\n").up_down, [""; 0]);
 }
 
-// covers: service
+// covers: daemon
 #[test]
 fn variables_of_ringcat_are_the_options_of_the_daemon() {
     let text = "RINGCAT_MASTER0_SIM=/srv/a.toml\nRINGCAT_MASTER0_SAFE_STATE=safeop\nRINGCAT_SOCKET=/run/x\n\
@@ -76,7 +76,7 @@ fn variables_of_ringcat_are_the_options_of_the_daemon() {
     assert_eq!(read(empty).own, Own::default());
 }
 
-// covers: service
+// covers: daemon
 #[test]
 fn the_last_of_several_assignments_counts_and_the_others_say_so() {
     let conf = read("MASTER0_DEVICE=eth0 # before\nMASTER0_DEVICE=eth1\n");
@@ -84,7 +84,7 @@ fn the_last_of_several_assignments_counts_and_the_others_say_so() {
     assert_eq!(conf.understood[0].text, "line 2 counts instead");
 }
 
-// covers: service
+// covers: daemon
 #[test]
 fn values_that_cannot_be_meant_are_mistakes() {
     let cases = [
@@ -118,7 +118,7 @@ fn values_that_cannot_be_meant_are_mistakes() {
     assert!(mistake(&many).contains("at most 64"));
 }
 
-// covers: service
+// covers: daemon
 #[test]
 fn a_file_without_a_master_is_a_mistake() {
     for text in ["", "MASTER0_DEVICE=\"\"\nDEVICE_MODULES=\"\"\n"] {
