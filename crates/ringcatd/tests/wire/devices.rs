@@ -3,8 +3,8 @@
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use ringcat::AlState;
 use ringcat::daemon::{Answer, Ask};
+use ringcat::{Activity, AlState};
 use ringcat_control::message::{ToolAnswer, ToolAsk};
 
 use crate::bench::{Bench, LINE, RING, ip};
@@ -47,6 +47,15 @@ fn stays(bench: &Bench, what: &str, holds: impl Fn(&Bench) -> bool) {
         assert!(holds(bench), "{what}: {:?}, {:?}, {:#?}", bench.states(), used(bench), bench.lines());
         std::thread::sleep(Duration::from_millis(20));
     }
+}
+
+/// Waits until the daemon that runs now has found all SubDevices.
+fn wait_for_scan(bench: &Bench) {
+    let is_scanned = || match bench.client().ask(0, Ask::State, Vec::new()) {
+        Ok((Answer::State(state), _)) => state.activity == Activity::Scanned && state.subdevices.len() == 3,
+        _ => false,
+    };
+    bench.wait_until("it is scanned", is_scanned);
 }
 
 const FIRST: &str = "0=ff:ff:ff:ff:ff:ff";
@@ -166,9 +175,8 @@ fn interfaces_are_switched_with_the_daemon_but_not_under_an_application() {
     bench.wait_for(AlState::PreOp);
     bench.end_daemon(daemon);
     assert!(!has_flag_up(&bench, "near0") && !has_flag_up(&bench, "near1"));
-    let before = bench.lines().len();
     let daemon = bench.start_daemon(&["--conf", &conf]);
-    bench.wait_until("it is scanned", || bench.lines()[before..].iter().any(|line| line.contains("responding: 3")));
+    wait_for_scan(&bench);
     bench.wait_until("both are on", || has_flag_up(&bench, "near0") && has_flag_up(&bench, "near1"));
     bench.wait_for(AlState::PreOp);
     let mut child = bench.application("killed");
