@@ -173,10 +173,13 @@ fn interfaces_are_switched_with_the_daemon_but_not_under_an_application() {
     stays(&bench, "it waits for its backup interface", |bench| used(bench).is_empty());
     bench.plug_in(1);
     bench.wait_for(AlState::PreOp);
+    bench.wait_for_line("Slave(s) responding: 3");
     bench.end_daemon(daemon);
     assert!(!has_flag_up(&bench, "near0") && !has_flag_up(&bench, "near1"));
     let daemon = bench.start_daemon(&["--conf", &conf]);
     wait_for_scan(&bench);
+    let said = || bench.lines().iter().filter(|line| line.contains("Slave(s) responding: 3")).count();
+    bench.wait_until("both daemons have said so", || said() == 2);
     bench.wait_until("both are on", || has_flag_up(&bench, "near0") && has_flag_up(&bench, "near1"));
     bench.wait_for(AlState::PreOp);
     let mut child = bench.application("killed");
