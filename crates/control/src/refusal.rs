@@ -106,9 +106,9 @@ impl fmt::Display for Refusal {
             Refusal::Version { here, there } => {
                 write!(f, "expected control version {here}, got {there}: install ringcatd and library of one release")
             }
-            Refusal::ReadOnly => {
-                f.write_str("this user may read only; ringcatd lets root, its own user and --group change the bus")
-            }
+            Refusal::ReadOnly => f.write_str(
+                "this user may read only; --mode and --group of ringcatd say which users may change the bus",
+            ),
             Refusal::NoMaster { master, present } => {
                 let present: Vec<String> = present.iter().map(u32::to_string).collect();
                 write!(f, "there is no master {master}; there are: {}", present.join(", "))

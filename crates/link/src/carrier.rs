@@ -71,25 +71,23 @@ impl CarrierWatch {
         CarrierWatch::start_for_any(interfaces, period)
     }
 
-    /// The same where interfaces may be missing: they have no carrier until they come.
+    /// The same where interfaces may be missing: they have no carrier until they come. An address (colons) stands for
+    /// the interface that has it then.
     ///
     /// # Errors
     /// The system cannot start a thread.
     pub fn start_for_any(interfaces: &[&str], period: Duration) -> Result<CarrierWatch, LinkError> {
         let failed = |what| move |errno| LinkError::from_errno(&interfaces.join(" and "), what, errno);
         let socket = kernel::request_socket().map_err(failed("opening a socket to read the carrier"))?;
-        let watched: Vec<(String, Carrier)> =
-            interfaces.iter().map(|name| (name.to_string(), Carrier::new(has_carrier(&socket, name)))).collect();
-        let carriers = watched.iter().map(|(_, carrier)| carrier.clone()).collect();
+        let mut watched: Vec<Watched> = interfaces.iter().map(|name| Watched::new(&socket, name)).collect();
+        let carriers = watched.iter().map(|it| it.carrier.clone()).collect();
         let stop = Arc::new(());
         let running = Arc::downgrade(&stop);
         let poll = move || {
             realtime::leave();
             while running.strong_count() > 0 {
                 thread::park_timeout(period);
-                for (name, carrier) in &watched {
-                    carrier.set(has_carrier(&socket, name));
-                }
+                watched.iter_mut().for_each(|it| it.look(&socket));
             }
         };
         let thread = thread::Builder::new()
@@ -117,6 +115,57 @@ impl Drop for CarrierWatch {
             let _ = thread.join();
         }
     }
+}
+
+/// An interface that is watched.
+struct Watched {
+    name: String,
+    carrier: Carrier,
+    /// It has this address, and no name yet.
+    address: Option<[u8; 6]>,
+    /// Looks until its name is searched for again.
+    pause: u32,
+}
+
+impl Watched {
+    /// Looks between searches for a name, which take longer than those at a carrier.
+    const PAUSE: u32 = 100;
+
+    fn new(socket: &OwnedFd, name: &str) -> Watched {
+        let mut watched =
+            Watched { name: name.to_owned(), carrier: Carrier::new(false), address: address(name), pause: 0 };
+        watched.search();
+        // The first state is no change.
+        watched.carrier = Carrier::new(has_carrier(socket, &watched.name));
+        watched
+    }
+
+    fn look(&mut self, socket: &OwnedFd) {
+        self.search();
+        self.carrier.set(has_carrier(socket, &self.name));
+    }
+
+    fn search(&mut self) {
+        let Some(address) = self.address else { return };
+        if self.pause > 0 {
+            self.pause -= 1;
+            return;
+        }
+        self.pause = Watched::PAUSE;
+        if let Some(found) = interface::list().into_iter().find(|it| it.mac == address) {
+            (self.name, self.address) = (found.name, None);
+        }
+    }
+}
+
+/// Six pairs of hexadecimal digits with colons, which no name of an interface has.
+fn address(text: &str) -> Option<[u8; 6]> {
+    let mut address = [0; 6];
+    let mut parts = text.split(':');
+    for byte in &mut address {
+        *byte = u8::from_str_radix(parts.next()?, 16).ok()?;
+    }
+    parts.next().is_none().then_some(address)
 }
 
 fn has_carrier(socket: &OwnedFd, name: &str) -> bool {
@@ -150,6 +199,20 @@ mod tests {
             assert_eq!(carrier.is_up(), up);
         }
         assert_eq!(carrier.changes(), 2);
+    }
+
+    #[test]
+    fn an_address_stands_for_the_interface_that_has_it() {
+        let (lo, list) = (interface::carrier("lo"), interface::list());
+        let first = list.iter().find(|it| it.mac == [0; 6]).expect("the loopback has zeros");
+        let names = ["00:00:00:00:00:00", "02:00:00:00:00:99"];
+        let watch = CarrierWatch::start_for_any(&names, CarrierWatch::PERIOD).expect("a watch");
+        assert!(first.name != "lo" || lo == Some(watch.carrier(0).is_up()));
+        assert!(!watch.carrier(1).is_up());
+        assert_eq!(
+            [address("lo"), address("0:1:2:3:4:f5"), address("0:1:2:3:4:5:6")],
+            [None, Some([0, 1, 2, 3, 4, 0xf5]), None]
+        );
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! module. All results are those of the calling thread's network namespace.
 
 pub mod ethtool;
+pub mod free;
 mod netlink;
 mod use_warning;
 

@@ -1,20 +1,27 @@
 //! The daemon of RingCAT: it drives segments while no application does, and hands them over.
 //!
-//! * [`source`]: the links of a master as an option names them; [`wires`]: opened anew for each owner; [`opened`]: as
-//!   long as a process has them; [`opener`]: packet sockets from a process of its own;
+//! * [`conf`]: the configuration file; [`setup`]: what the daemon is to do, from the file and from options; [`check`]:
+//!   what of it was understood, in text; [`up_down`]: interfaces that are switched on and off with the daemon;
+//! * [`source`]: the links of a master as an option names them; [`device`]: a network interface, and where it is;
+//!   [`wires`]: opened anew for each owner; [`opened`]: as long as a process has them; [`opener`]: packet sockets from
+//!   a process of its own;
 //! * [`segment_process`]: a simulated segment in a process of its own;
 //! * [`master`]: a master with the process that drives it; [`driving`]: this daemon while it does;
 //! * [`ethernet`]: network interfaces of EoE, which outlast applications;
 //! * [`owner`]: questions to an application that drives a master; [`tenure`]: its time, and what ends it;
 //!   [`process_state`]: what the kernel tells of its process; [`owner_lock`]: what of it outlives the daemon;
 //! * [`listening`], [`session`], [`rights`]: clients, what they ask, what they may;
-//! * [`daemon`]: all of it; [`log`]: lines for the operator.
+//! * [`daemon`]: all of it; [`running`]: from its start to its end; [`service_manager`]: what that is told; [`log`]:
+//!   lines for the operator.
 //!
 //! A thread serves each client, so one that is slow or hostile keeps nothing but its own thread. Decisions 0074 to
 //! 0076.
 #![forbid(unsafe_code)]
 
+pub mod check;
+pub mod conf;
 pub mod daemon;
+pub mod device;
 pub mod driving;
 pub mod ethernet;
 pub mod listening;
@@ -26,8 +33,12 @@ pub mod owner;
 pub mod owner_lock;
 pub mod process_state;
 pub mod rights;
+pub mod running;
 pub mod segment_process;
+pub mod service_manager;
 pub mod session;
+pub mod setup;
 pub mod source;
 pub mod tenure;
+pub mod up_down;
 pub mod wires;

@@ -19,6 +19,8 @@ use crate::session::{self, ClientProcess, Masters};
 
 /// Clients at a time.
 pub const MOST_CLIENTS: usize = 64;
+/// What a client is told that has connected, but may do nothing.
+const NO_RIGHT: &str = "this user may not ask; --mode and --group of ringcatd say which users may";
 /// Clients at a time that may only read: the others always find room.
 pub const MOST_READERS: usize = 48;
 
@@ -192,7 +194,7 @@ impl Drop for Listening {
 fn bind(hidden: &Path, rights: Rights) -> io::Result<UnixListener> {
     let _ = std::fs::remove_file(hidden);
     let listener = UnixListener::bind(hidden)?;
-    std::fs::set_permissions(hidden, std::fs::Permissions::from_mode(rights.mode))?;
+    std::fs::set_permissions(hidden, std::fs::Permissions::from_mode(rights.file_mode()))?;
     if let Some(group) = rights.group {
         chown(hidden, None, Some(group))?;
     }
@@ -211,7 +213,11 @@ fn accept(listener: &UnixListener, rights: Rights, masters: &Arc<Masters>, is_ov
             }
         };
         let Ok(peer) = Peer::of(&stream) else { continue };
-        let (right, end) = (rights.of(&peer), watch_peer(&stream, &peer));
+        let Some(right) = rights.of(&peer) else {
+            refuse(stream, Refusal::Failed(NO_RIGHT.to_owned()));
+            continue;
+        };
+        let end = watch_peer(&stream, &peer);
         let place = match Place::take(&counts, right) {
             Ok(place) => place,
             Err(refusal) => {

@@ -40,12 +40,14 @@ pub struct Settings {
     pub lock: Option<OwnerLock>,
     /// Network interfaces of EoE; `None`: none is made.
     pub interfaces: Option<EthernetInterfaces>,
+    /// Level of messages at the beginning.
+    pub debug_level: u32,
 }
 
 impl Settings {
-    /// PREOP, without a lock and network interfaces.
+    /// PREOP, without a lock, network interfaces and messages.
     pub fn new(number: u32, links: String) -> Settings {
-        Settings { number, links, safe_state: AlState::PreOp, lock: None, interfaces: None }
+        Settings { number, links, safe_state: AlState::PreOp, lock: None, interfaces: None, debug_level: 0 }
     }
 }
 
@@ -131,7 +133,7 @@ impl Master {
 
     /// The same with settings. Links that cannot be opened are tried again by [`Master::look_after`].
     pub fn start(settings: Settings, wires: Wires) -> Master {
-        let Settings { number, links, safe_state, lock, interfaces } = settings;
+        let Settings { number, links, safe_state, lock, interfaces, debug_level } = settings;
         let master = Master {
             number,
             links,
@@ -142,7 +144,7 @@ impl Master {
             interfaces: interfaces.map(Arc::new),
             knowledge: Mutex::default(),
             lines: Arc::default(),
-            debug_level: AtomicU32::new(0),
+            debug_level: AtomicU32::new(debug_level),
         };
         master.drive(Handover::Orderly);
         master.prepare();
@@ -352,6 +354,7 @@ impl Master {
     /// have come back to the process that drives the master.
     pub fn look_after(&self) {
         self.prepare();
+        self.leave_alone();
         let is_faulty = matches!(&*locked(&self.driver), Driver::Fault(_));
         if is_faulty {
             self.drive(Handover::AfterCrash);
@@ -365,6 +368,26 @@ impl Master {
         };
         for change in changes {
             say(format_args!("master {}: {change}", self.number));
+        }
+    }
+
+    /// An interface that was not named, but chosen, is left alone when the host begins to use it. One that an
+    /// application drives stays: a machine may run with it.
+    fn leave_alone(&self) {
+        if !matches!(&*locked(&self.driver), Driver::Daemon(..)) {
+            return;
+        }
+        let Some(cause) = locked(&self.wires).leave_misfit() else { return };
+        let before = {
+            let mut driver = locked(&self.driver);
+            match &*driver {
+                Driver::Daemon(..) => std::mem::replace(&mut *driver, Driver::Fault(cause.clone())),
+                Driver::Owner(..) | Driver::Changing | Driver::Fault(_) => return,
+            }
+        };
+        say(format_args!("master {} is not driven: {cause}", self.number));
+        if let Driver::Daemon(_, opened) = &before {
+            opened.revoke();
         }
     }
 
@@ -399,6 +422,9 @@ impl Master {
         let interfaces = self.interfaces.clone();
         let lasting = Lasting { number: self.number, knowledge: &knowledge, lines, debug_level, interfaces };
         let driving = Driving::start(&opened, &lasting, handover)?;
+        for absent in opened.absent() {
+            say(format_args!("master {}: interface {absent} is not there; the ring goes on without it", self.number));
+        }
         Ok((driving, opened))
     }
 

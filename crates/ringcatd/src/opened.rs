@@ -7,8 +7,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use ringcat_control::message::{HandedLink, HandedLinks};
 use ringcat_link::capabilities::{self, Capabilities};
 use ringcat_link::packet_socket::binding::{give, given};
-use ringcat_link::{LinkError, PresentInterface, interface, revoke};
+use ringcat_link::{LinkError, interface, revoke};
 
+use crate::device::{Device, Found};
 use crate::opener::SLOTS;
 
 /// Address that stands for an interface that was never seen: locally administered, with the number of the link.
@@ -37,6 +38,8 @@ enum State {
 /// An interface that may come and go.
 #[derive(Debug)]
 struct Followed {
+    device: Device,
+    /// As it was last seen.
     name: String,
     is_there: bool,
     /// An owner has ordered it switched off.
@@ -49,34 +52,42 @@ impl Opened {
         Opened { links, descriptors, state: Mutex::new(State::Pipes) }
     }
 
-    /// Sockets that get the interfaces with these names, as far as they are there.
+    /// Sockets that get these interfaces, as far as they are there.
     ///
     /// # Errors
     /// None is there, one is no Ethernet interface, or there are not two sockets for each; for the operator.
-    pub fn interfaces(names: &[String], sockets: Vec<OwnedFd>) -> Result<Opened, String> {
+    pub fn interfaces(devices: &[Device], sockets: Vec<OwnedFd>) -> Result<Opened, String> {
         let failed = |error: LinkError| error.to_string();
         let mut followed = Vec::new();
         let mut links = Vec::new();
-        for (number, name) in names.iter().enumerate() {
-            let found = PresentInterface::find(name).map_err(failed)?;
-            if let Some(found) = found {
-                for socket in of_link(&sockets, number, names.len()) {
-                    give(socket.as_fd(), name, found).map_err(failed)?;
+        for (number, device) in devices.iter().enumerate() {
+            let found = device.find(&[])?;
+            if let Some(Found { name, interface }) = &found {
+                for socket in of_link(&sockets, number, devices.len()) {
+                    give(socket.as_fd(), name, *interface).map_err(failed)?;
                 }
             }
-            let [a, b, c, d, e, _] = UNSEEN;
-            let absent_mac = found.is_none().then_some([a, b, c, d, e, number as u8]);
+            let absent_mac = found.is_none().then_some(stand_in(device, number));
+            let is_there = found.is_some();
+            let name = found.map_or_else(|| device.to_string(), |found| found.name);
             links.push(HandedLink::Interface { name: name.clone(), slots: SLOTS, absent_mac });
-            followed.push(Followed { name: name.clone(), is_there: found.is_some(), is_off: false });
+            followed.push(Followed { device: device.clone(), name, is_there, is_off: false });
         }
-        if let Some(missing) = names.first().filter(|_| !followed.iter().any(|it| it.is_there)) {
-            let present = interface::list().into_iter().map(|it| it.name).collect();
-            return Err(failed(LinkError::NoInterface { name: missing.clone(), present }));
+        if let Some(missing) = devices.first().filter(|_| !followed.iter().any(|it| it.is_there)) {
+            return Err(missing.missing());
         }
         let mut links = links.into_iter();
         let main = links.next().ok_or_else(|| "a master has no link".to_owned())?;
         let links = HandedLinks { main, redundant: links.next() };
         Ok(Opened { links, descriptors: sockets, state: Mutex::new(State::Interfaces(followed)) })
+    }
+
+    /// Interfaces that are not there.
+    pub fn absent(&self) -> Vec<String> {
+        match &*self.state() {
+            State::Interfaces(all) => all.iter().filter(|it| !it.is_there).map(|it| it.device.to_string()).collect(),
+            State::Pipes | State::Revoked => Vec::new(),
+        }
     }
 
     /// What the links are.
@@ -120,19 +131,19 @@ impl Opened {
         let mut changes = Vec::new();
         for (number, one) in all.iter_mut().enumerate() {
             let sockets = || of_link(&self.descriptors, number, count);
-            let found = PresentInterface::find(&one.name).ok().flatten();
-            let Some(found) = found else {
+            let Some(Found { name, interface }) = one.device.find(&[]).ok().flatten() else {
                 if std::mem::replace(&mut one.is_there, false) {
                     changes.push(format!("interface {} was removed", one.name));
                 }
                 continue;
             };
-            let has_it = |socket: &OwnedFd| given(socket.as_fd()).is_ok_and(|index| index == Some(found.index));
+            one.name = name;
+            let has_it = |socket: &OwnedFd| given(socket.as_fd()).is_ok_and(|index| index == Some(interface.index));
             if sockets().all(has_it) {
                 continue;
             }
             // It may be gone again; the next look tries again.
-            let is_given = sockets().all(|socket| give(socket.as_fd(), &one.name, found).is_ok());
+            let is_given = sockets().all(|socket| give(socket.as_fd(), &one.name, interface).is_ok());
             if is_given && !std::mem::replace(&mut one.is_there, true) {
                 changes.push(format!("interface {} is there", one.name));
             } else if is_given {
@@ -177,6 +188,15 @@ impl Opened {
             // It may be gone: then it comes back as its operator has it.
             let _ = interface::switch(&one.name, true);
         }
+    }
+}
+
+/// The address that stands for an interface that is not there: its own if it is known.
+fn stand_in(device: &Device, link: usize) -> [u8; 6] {
+    let [a, b, c, d, e, _] = UNSEEN;
+    match device {
+        Device::Address(address) => *address,
+        Device::Name(_) | Device::First => [a, b, c, d, e, link as u8],
     }
 }
 

@@ -1,19 +1,27 @@
 //! What a client may do: by the credentials of its process when it connected.
 //!
-//! Which clients can connect at all follows from owner, group and mode of the socket. Root, the user of the daemon and
-//! the members of one group may change the bus; all others that can connect may read.
+//! The mode has the meaning that it has for a file: its bits say for the user of the daemon, for the members of the
+//! group and for all others whether they may read (`r`) and change the bus (`w`). `connect` needs the right to write a
+//! socket's file, so the file gets both bits for all that may do anything. Root may change the bus in any case.
 
+use std::fmt;
 use std::fs;
 
 use ringcat_control::Right;
 use ringcat_link::process::{Peer, effective_user};
 
-/// Which clients may change the bus, and which can connect.
+/// Bits of one class in a mode.
+const READ: u32 = 0o4;
+const CHANGE: u32 = 0o2;
+/// Bits that a mode can have here.
+const BITS: u32 = 0o666;
+
+/// Which clients may read, and which may change the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rights {
-    /// Members of this group may change the bus.
+    /// The group; without one no client is a member.
     pub group: Option<u32>,
-    /// Mode of the socket.
+    /// For the user of the daemon, members of the group, and all others.
     pub mode: u32,
 }
 
@@ -24,10 +32,52 @@ impl Default for Rights {
 }
 
 impl Rights {
-    /// What the process at the other end may do.
-    pub fn of(&self, peer: &Peer) -> Right {
-        let is_member = self.group.is_some_and(|group| peer.groups.contains(&group));
-        if peer.uid == 0 || peer.uid == effective_user() || is_member { Right::Change } else { Right::Read }
+    /// What the process at the other end may do; `None`: nothing.
+    pub fn of(&self, peer: &Peer) -> Option<Right> {
+        if peer.uid == 0 {
+            return Some(Right::Change);
+        }
+        let is_member = || self.group.is_some_and(|group| peer.groups.contains(&group));
+        right(match peer.uid == effective_user() {
+            true => self.mode >> 6,
+            false if is_member() => self.mode >> 3,
+            false => self.mode,
+        })
+    }
+
+    /// Mode of the socket's file: which processes can connect.
+    pub fn file_mode(&self) -> u32 {
+        let others = self.mode & 0o7;
+        let group = if self.group.is_some() { self.mode >> 3 & 0o7 } else { others };
+        [self.mode >> 6 & 0o7, group, others].iter().fold(0, |file, class| {
+            let connects = if right(*class).is_some() { READ | CHANGE } else { 0 };
+            file << 3 | connects
+        })
+    }
+}
+
+/// What the bits of a class allow. Without the right to read there is none.
+fn right(class: u32) -> Option<Right> {
+    match class & (READ | CHANGE) {
+        bits if bits == READ | CHANGE => Some(Right::Change),
+        READ => Some(Right::Read),
+        _ => None,
+    }
+}
+
+impl fmt::Display for Rights {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let shown = |class| match right(class) {
+            Some(Right::Change) => "read and change",
+            Some(Right::Read) => "read",
+            None => "do nothing",
+        };
+        write!(f, "mode {:04o}: the user of the daemon may {}, ", self.mode, shown(self.mode >> 6))?;
+        match self.group {
+            Some(group) => write!(f, "members of group {group} may {}, ", shown(self.mode >> 3))?,
+            None => f.write_str("no group is named, ")?,
+        }
+        write!(f, "all others may {}", shown(self.mode))
     }
 }
 
@@ -48,13 +98,19 @@ fn named(file: &str, name: &str) -> Option<u32> {
     })
 }
 
-/// A mode as `chmod` takes it: octal digits.
+/// A mode as `chmod` takes it: octal digits, of the bits to read and to change.
 ///
 /// # Errors
 /// It is none.
 pub fn mode(text: &str) -> Result<u32, String> {
-    let mode = u32::from_str_radix(text, 8).ok().filter(|mode| *mode <= 0o777);
-    mode.ok_or_else(|| format!("expected octal digits as 0660, got {text:?}"))
+    let is_octal = !text.is_empty() && text.bytes().all(|it| matches!(it, b'0'..=b'7'));
+    let mode = u32::from_str_radix(text, 8).ok().filter(|mode| is_octal && *mode & !BITS == 0);
+    let mode = mode.ok_or_else(|| format!("expected octal digits as 0660, 0664 or 0666, got {text:?}"))?;
+    let changes_only = |shift: u32| mode >> shift & (READ | CHANGE) == CHANGE;
+    match [6, 3, 0].into_iter().any(changes_only) {
+        true => Err(format!("{text:?} lets clients change the bus that may not read it; expected 6, 4 or 0")),
+        false => Ok(mode),
+    }
 }
 
 #[cfg(test)]
@@ -72,14 +128,36 @@ mod tests {
 
     // covers: daemon
     #[test]
-    fn root_the_daemons_user_and_members_of_the_group_may_change_others_read() {
-        let rights = Rights { group: Some(44), ..Rights::default() };
-        let other = effective_user() + 1;
-        assert_eq!(rights.of(&peer(0, &[0])), Right::Change);
-        assert_eq!(rights.of(&peer(effective_user(), &[7])), Right::Change);
-        assert_eq!(rights.of(&peer(other, &[7, 44])), Right::Change);
-        assert_eq!(rights.of(&peer(other, &[7, 45])), Right::Read);
-        assert_eq!(Rights::default().of(&peer(other, &[44])), Right::Read);
+    fn a_mode_says_for_user_group_and_others_what_they_may() {
+        use Right::{Change, Read};
+        let (root, user, stranger) = (peer(0, &[0]), effective_user(), effective_user() + 1);
+        let (own, member, other) = (peer(user, &[7]), peer(stranger, &[7, 44]), peer(stranger, &[7, 45]));
+        let cases = [
+            (0o660, Some(Change), None, 0o660),
+            (0o664, Some(Change), Some(Read), 0o666),
+            (0o666, Some(Change), Some(Change), 0o666),
+            (0o644, Some(Read), Some(Read), 0o666),
+            (0o640, Some(Read), None, 0o660),
+            (0o600, None, None, 0o600),
+        ];
+        for (mode, of_member, of_other, file) in cases {
+            let rights = Rights { group: Some(44), mode };
+            let found = [&root, &own, &member, &other].map(|peer| rights.of(peer));
+            assert_eq!(found, [Some(Change), Some(Change), of_member, of_other], "{mode:o}");
+            assert_eq!(rights.file_mode(), file, "{mode:o}");
+        }
+    }
+
+    // covers: daemon
+    #[test]
+    fn without_a_group_no_client_is_a_member() {
+        let other = peer(effective_user() + 1, &[44]);
+        assert_eq!(Rights::default().of(&other), None);
+        assert_eq!(Rights::default().file_mode(), 0o600);
+        let all_read = Rights { group: None, mode: 0o664 };
+        assert_eq!((all_read.of(&other), all_read.file_mode()), (Some(Right::Read), 0o666));
+        let shown = Rights { group: Some(44), mode: 0o664 }.to_string();
+        assert!(shown.ends_with("members of group 44 may read and change, all others may read"), "{shown}");
     }
 
     // covers: daemon
@@ -91,5 +169,7 @@ mod tests {
         assert!(group("no such group").is_err());
         assert_eq!((mode("0660"), mode("666")), (Ok(0o660), Ok(0o666)));
         assert!(mode("8").is_err() && mode("7777").is_err() && mode("").is_err());
+        assert!(mode("0770").is_err() && mode("+660").is_err());
+        assert!(mode("0620").expect_err("it is strange").contains("may not read it"));
     }
 }

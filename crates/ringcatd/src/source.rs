@@ -1,4 +1,4 @@
-//! The links of a master as the option `--master` names them.
+//! The links of a master as the option `--master` or a configuration file names them.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -6,16 +6,18 @@ use std::str::FromStr;
 
 use ringcat::AlState;
 
+use crate::device::Device;
+
 /// Where the frames of a master go.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Source {
     /// A segment file, simulated in a process of its own.
     Simulated(PathBuf),
     /// Network interfaces: main, redundant.
-    Interfaces(String, Option<String>),
+    Interfaces(Device, Option<Device>),
 }
 
-/// A master with its links: `0=eth1`, `0=eth1,eth2`, `0=sim:FILE`.
+/// A master with its links: `0=eth1`, `0=eth1,eth2`, `0=00:00:08:44:ab:66`, `0=sim:FILE`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MasterOption {
     /// Its number.
@@ -28,7 +30,7 @@ impl fmt::Display for Source {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Source::Simulated(file) => write!(f, "sim:{}", file.display()),
-            Source::Interfaces(main, None) => f.write_str(main),
+            Source::Interfaces(main, None) => main.fmt(f),
             Source::Interfaces(main, Some(redundant)) => write!(f, "{main},{redundant}"),
         }
     }
@@ -47,14 +49,17 @@ impl FromStr for MasterOption {
                 file => Ok(MasterOption { master, source: Source::Simulated(file.into()) }),
             };
         }
-        let mut names = links.split(',').map(str::to_owned);
-        let (main, redundant) = (names.next().unwrap_or_default(), names.next());
-        let is_named = |name: &String| !name.is_empty();
-        if names.next().is_some() || !is_named(&main) || !redundant.iter().all(is_named) {
+        let mut names = links.split(',');
+        let main: Device = names.next().unwrap_or_default().parse()?;
+        let redundant: Option<Device> = names.next().map(str::parse).transpose()?;
+        if names.next().is_some() {
             return Err(expected());
         }
         if redundant.as_ref() == Some(&main) {
             return Err(format!("{text:?} names one interface for both ends of a ring"));
+        }
+        if redundant == Some(Device::First) {
+            return Err(format!("{text:?}: {} stands for the main interface only", Device::First));
         }
         Ok(MasterOption { master, source: Source::Interfaces(main, redundant) })
     }
@@ -94,7 +99,7 @@ pub fn check(masters: &[MasterOption]) -> Result<(), String> {
         return Err("expected at least one --master".to_owned());
     }
     let mut numbers: Vec<u32> = masters.iter().map(|it| it.master).collect();
-    let mut names: Vec<&String> = masters.iter().flat_map(|it| interfaces(&it.source)).collect();
+    let mut names: Vec<String> = masters.iter().flat_map(|it| it.source.devices()).map(Device::to_string).collect();
     numbers.sort_unstable();
     names.sort_unstable();
     if let Some(pair) = numbers.windows(2).find(|pair| pair[0] == pair[1]) {
@@ -106,12 +111,15 @@ pub fn check(masters: &[MasterOption]) -> Result<(), String> {
     }
 }
 
-fn interfaces(source: &Source) -> impl Iterator<Item = &String> {
-    let (main, redundant) = match source {
-        Source::Simulated(_) => (None, None),
-        Source::Interfaces(main, redundant) => (Some(main), redundant.as_ref()),
-    };
-    main.into_iter().chain(redundant)
+impl Source {
+    /// Its network interfaces.
+    pub fn devices(&self) -> impl Iterator<Item = &Device> {
+        let (main, redundant) = match self {
+            Source::Simulated(_) => (None, None),
+            Source::Interfaces(main, redundant) => (Some(main), redundant.as_ref()),
+        };
+        main.into_iter().chain(redundant)
+    }
 }
 
 #[cfg(test)]
@@ -125,11 +133,13 @@ mod tests {
     // covers: daemon
     #[test]
     fn a_master_has_a_number_and_one_link_two_links_or_a_segment_file() {
-        for text in ["0=eth1", "3=eth1,eth2", "0=sim:a=b,c.toml"] {
+        for text in ["0=eth1", "3=eth1,eth2", "0=sim:a=b,c.toml", "0=00:01:02:03:04:05,eth2", "1=ff:ff:ff:ff:ff:ff"] {
             let option = parse(text).expect("it is right");
             assert_eq!(format!("{}={}", option.master, option.source), text);
         }
-        for text in ["", "eth1", "x=eth1", "0=", "0=sim:", "0=a,", "0=,a", "0=a,b,c", "-1=a", "0=a,a"] {
+        for text in
+            ["", "eth1", "x=eth1", "0=", "0=sim:", "0=a,", "0=,a", "0=a,b,c", "-1=a", "0=a,a", "0=a,ff:ff:ff:ff:ff:ff"]
+        {
             assert!(parse(text).is_err(), "{text}");
         }
     }

@@ -145,8 +145,8 @@ mod tests {
     use crate::wires::Wires;
 
     fn master() -> Master {
-        let source = Source::Interfaces("nonexistent".to_owned(), None);
-        let wires = Wires::of(&source, &std::sync::Arc::new(Opener::Here)).expect("it has a name");
+        let source = Source::Interfaces(crate::device::Device::Name("nonexistent".to_owned()), None);
+        let wires = Wires::of(&source, &[], &std::sync::Arc::new(Opener::Here)).expect("it has a name");
         Master::new(0, source.to_string(), wires)
     }
 

@@ -11,7 +11,9 @@ use std::sync::Arc;
 use ringcat::piped::segment::connect;
 use ringcat_control::message::{HandedLink, HandedLinks};
 use ringcat_link::descriptors;
+use ringcat_link::interface::{self, free};
 
+use crate::device::Device;
 use crate::opened::Opened;
 use crate::opener::Opener;
 use crate::segment_process;
@@ -40,7 +42,13 @@ pub enum Wires {
 #[derive(Debug)]
 pub struct Interfaces {
     /// Main, redundant.
-    names: Vec<String>,
+    devices: Vec<Device>,
+    /// Those of other masters: never the first one that is free.
+    others: Vec<Device>,
+    /// Address of the interface that was the first one that was free.
+    chosen: Option<[u8; 6]>,
+    /// No link is used while one lacks its interface.
+    needs_all: bool,
     /// Sets of sockets that wait without an interface, since the kernel takes long to make their rings; each in the
     /// order of [`HandedLinks`].
     spares: Vec<Vec<OwnedFd>>,
@@ -55,21 +63,42 @@ pub struct Lacking {
 }
 
 impl Wires {
-    /// The links that an option names; starts the process of a simulated segment.
+    /// The links that an option names; starts the process of a simulated segment. `others` are the interfaces of other
+    /// masters.
     ///
     /// # Errors
     /// What is wrong, for the operator.
-    pub fn of(source: &Source, opener: &Arc<Opener>) -> Result<Wires, String> {
+    pub fn of(source: &Source, others: &[Device], opener: &Arc<Opener>) -> Result<Wires, String> {
         match source {
             Source::Simulated(file) => {
                 let (child, control, is_ring) = segment_process::start(file)?;
                 Ok(Wires::Segment { control, is_ring, child: Some(child) })
             }
-            Source::Interfaces(main, redundant) => {
-                let names = [Some(main), redundant.as_ref()].into_iter().flatten().cloned().collect();
-                Ok(Wires::Interfaces(Interfaces { names, spares: Vec::new(), opener: opener.clone() }))
-            }
+            Source::Interfaces(..) => Ok(Wires::Interfaces(Interfaces {
+                devices: source.devices().cloned().collect(),
+                others: others.to_vec(),
+                chosen: None,
+                needs_all: false,
+                spares: Vec::new(),
+                opener: opener.clone(),
+            })),
         }
+    }
+
+    /// No link is used while one lacks its interface, also of a ring.
+    pub fn need_all(&mut self) {
+        if let Wires::Interfaces(interfaces) = self {
+            interfaces.needs_all = true;
+        }
+    }
+
+    /// Whether the interface that was chosen is to be left alone from now on, and why: it is gone, or the host uses it.
+    /// The next open chooses again.
+    pub fn leave_misfit(&mut self) -> Option<String> {
+        let Wires::Interfaces(Interfaces { chosen, .. }) = self else { return None };
+        let cause = misfit((*chosen)?)?;
+        *chosen = None;
+        Some(cause)
     }
 
     /// The links to a segment that another thread or process simulates, which it has said.
@@ -101,18 +130,15 @@ impl Wires {
                 let links = HandedLinks { main: HandedLink::Pipe, redundant: is_ring.then_some(HandedLink::Pipe) };
                 Ok(Opened::pipes(links, all.into_iter().flatten().flatten().collect()))
             }
-            Wires::Interfaces(Interfaces { names, spares, opener }) => {
-                let set = spares.pop().map_or_else(|| opener.set(names.len()), Ok)?;
-                Opened::interfaces(names, set)
-            }
+            Wires::Interfaces(interfaces) => interfaces.open(),
         }
     }
 
     /// Whether sockets for the next process are to be prepared.
     pub fn lacking(&self) -> Option<Lacking> {
         match self {
-            Wires::Interfaces(Interfaces { names, spares, opener }) if spares.len() < SETS => {
-                Some(Lacking { links: names.len(), opener: opener.clone() })
+            Wires::Interfaces(Interfaces { devices, spares, opener, .. }) if spares.len() < SETS => {
+                Some(Lacking { links: devices.len(), opener: opener.clone() })
             }
             Wires::Interfaces(_) | Wires::Segment { .. } => None,
         }
@@ -123,6 +149,46 @@ impl Wires {
         if let Wires::Interfaces(Interfaces { spares, .. }) = self {
             spares.push(prepared);
         }
+    }
+}
+
+impl Interfaces {
+    /// Of two interfaces one may be absent, unless all are needed.
+    fn open(&mut self) -> Result<Opened, String> {
+        let devices =
+            self.devices.clone().into_iter().map(|device| self.settled(device)).collect::<Result<Vec<_>, _>>()?;
+        if self.needs_all {
+            let is_absent = |device: &&Device| !matches!(device.find(&[]), Ok(Some(_)));
+            if let Some(absent) = devices.iter().find(is_absent) {
+                return Err(format!("waits for interface {absent}"));
+            }
+        }
+        let set = self.spares.pop().map_or_else(|| self.opener.set(devices.len()), Ok)?;
+        Opened::interfaces(&devices, set)
+    }
+
+    /// The first interface that is free is chosen once, and stays until it is left: after an application that has it
+    /// the daemon leads its SubDevices to their safe state in any case.
+    fn settled(&mut self, device: Device) -> Result<Device, String> {
+        if device != Device::First {
+            return Ok(device);
+        }
+        let is_there = |address: &[u8; 6]| interface::list().iter().any(|it| it.mac == *address);
+        let chosen = match self.chosen.take().filter(is_there) {
+            Some(address) => address,
+            None => device.find(&self.others)?.ok_or_else(|| device.missing())?.interface.mac,
+        };
+        self.chosen = Some(chosen);
+        Ok(Device::Address(chosen))
+    }
+}
+
+/// Why an interface that was chosen must be left alone.
+fn misfit(address: [u8; 6]) -> Option<String> {
+    let device = Device::Address(address);
+    match interface::list().into_iter().find(|it| device.is(it)) {
+        None => Some(format!("interface {device} was removed")),
+        Some(interface) => free::in_use(&interface).map(|why| format!("leaves {} alone: {why}", interface.name)),
     }
 }
 

@@ -23,6 +23,13 @@ pub struct Membership {
     pub kind: String,
     /// Index of the other end of a veth pair, if it is in the same namespace.
     pub peer: Option<u32>,
+    /// Index of the interface below a VLAN, a macvlan, ..., if it is in the same namespace.
+    pub below: Option<u32>,
+}
+
+/// Whether an interface sends its frames over another one.
+pub fn is_above(index: u32, below: u32) -> bool {
+    index != below && membership(index).is_some_and(|it| it.below == Some(below))
 }
 
 /// Reads the membership of one interface; None if the kernel does not respond.
@@ -71,7 +78,9 @@ fn parse(answer: &[u8]) -> Option<Membership> {
             _ => {}
         }
     }
-    membership.peer = link.filter(|_| membership.kind == "veth" && !is_elsewhere);
+    let link = link.filter(|_| !is_elsewhere);
+    let is_pair = membership.kind == "veth";
+    (membership.peer, membership.below) = (link.filter(|_| is_pair), link.filter(|_| !is_pair));
     Some(membership)
 }
 
@@ -109,7 +118,7 @@ mod tests {
 
     #[test]
     fn controller_and_kind_are_found_among_other_attributes() {
-        let expected = Membership { controller: Some(7), kind: "bridge".to_owned(), peer: None };
+        let expected = Membership { controller: Some(7), kind: "bridge".to_owned(), peer: None, below: None };
         assert_eq!(parse(&answer()), Some(expected));
     }
 
@@ -125,11 +134,9 @@ mod tests {
         let mut above = empty();
         above.extend(attribute(libc::IFLA_LINK, &9u32.to_ne_bytes()));
         above.extend(attribute(libc::IFLA_LINKINFO, &attribute(libc::IFLA_INFO_KIND, b"macvlan\0")));
-        assert_eq!(
-            parse(&above).expect("an answer").peer,
-            None,
-            "the interface is stacked on the other one, not its peer"
-        );
+        let above = parse(&above).expect("an answer");
+        assert_eq!(above.peer, None, "the interface is stacked on the other one, not its peer");
+        assert_eq!(above.below, Some(9));
     }
 
     #[test]

@@ -83,6 +83,15 @@ impl Bench {
 
     /// The same with a safe state.
     pub fn with(count: usize, stop_limit: Duration, safe_state: AlState) -> Bench {
+        Bench::build(count, stop_limit, safe_state, Rights { group: None, mode: 0o664 })
+    }
+
+    /// A daemon on a ring of so many SubDevices that these users may use.
+    pub fn with_rights(count: usize, rights: Rights) -> Bench {
+        Bench::build(count, ringcatd::daemon::STOP_LIMIT, AlState::PreOp, rights)
+    }
+
+    fn build(count: usize, stop_limit: Duration, safe_state: AlState, rights: Rights) -> Bench {
         let turn = turn();
         let (near, far) = UnixStream::pair().expect("a pair");
         let (looks, asked) = channel::<Look>();
@@ -92,7 +101,6 @@ impl Bench {
         let socket = directory.join("socket");
         let settings = Settings { safe_state, ..Settings::new(0, "test".to_owned()) };
         let master = Master::start(settings, wires);
-        let rights = Rights { group: None, mode: 0o666 };
         let daemon = Daemon::start(vec![master], &socket, rights, stop_limit).expect("it listens");
         let (daemon, looks, segment) = (Some(daemon), Some(looks), Some(segment));
         let bench = Bench { socket, daemon, looks, segment, directory, _turn: turn };

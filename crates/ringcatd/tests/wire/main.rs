@@ -3,6 +3,7 @@
 //! The segment, the daemon and the applications are processes; the applications run as a user without a right.
 
 mod bench;
+mod devices;
 mod ends;
 mod ethernet;
 mod interfaces;

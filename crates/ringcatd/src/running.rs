@@ -1,0 +1,145 @@
+//! The daemon from its start to its end, as a service: what it is to do, masters, signs for the service manager.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use ringcat::Activity;
+use ringcat_control::message::{Answer, Ask};
+use ringcat_control::socket::to_listen_at;
+use ringcat_link::HeldSignals;
+use ringcat_link::capabilities::{Capabilities, keep};
+use ringcat_link::process::raise_descriptors;
+
+use crate::daemon::Daemon;
+use crate::ethernet::EthernetInterfaces;
+use crate::listening::Prepared;
+use crate::log::{flush, say};
+use crate::master::{Master, Settings};
+use crate::opener::Opener;
+use crate::owner_lock::OwnerLock;
+use crate::service_manager::ServiceManager;
+use crate::setup::Setup;
+use crate::source::{MasterOption, Source};
+use crate::up_down::UpDown;
+use crate::wires::Wires;
+
+/// Descriptors that are enough for all clients and many masters; limits are often lower.
+const DESCRIPTORS: u64 = 4096;
+/// Interval of attempts at what was not possible before.
+const LOOK: Duration = Duration::from_secs(1);
+/// Interval of looks at the first scans.
+const SOON: Duration = Duration::from_millis(20);
+/// The daemon is ready after this time, also if a segment is still being scanned.
+const FIRST_SCAN: Duration = Duration::from_secs(20);
+
+/// Runs the daemon until a signal ends it.
+///
+/// # Errors
+/// Why it cannot begin, for the operator.
+pub fn run(setup: &Setup) -> Result<(), String> {
+    setup.check_interfaces()?;
+    let held = HeldSignals::hold();
+    raise_descriptors(DESCRIPTORS);
+    std::panic::set_hook(Box::new(|panic| say(format_args!("{panic}"))));
+    let path = match &setup.socket {
+        Some(path) => path.clone(),
+        None => to_listen_at(|name| std::env::var_os(name))?,
+    };
+    let socket = Prepared::new(&path, setup.rights)?;
+    // Before there are threads and segments, which inherit what is left.
+    let has_interfaces = setup.masters.iter().any(|it| matches!(it.source, Source::Interfaces(..)));
+    let opener = Arc::new(if has_interfaces { Opener::start()? } else { Opener::Here });
+    keep(Capabilities::ADMIN).map_err(|error| format!("capabilities cannot be given up: {error}"))?;
+    let mut up_down = UpDown::start(&setup.up_down);
+    let mut masters = Vec::new();
+    for option in &setup.masters {
+        let started = master(setup, option, &path, &opener);
+        masters.push(started.map_err(|error| format!("master {}: {error}", option.master))?);
+    }
+    let daemon = Daemon::serve(masters, socket, Duration::from_millis(setup.stop_limit))?;
+    say(format_args!("listens at {}", path.display()));
+    serve(&daemon, &mut up_down, &held);
+    let is_driven = daemon.masters().iter().any(|master| master.state().owner.is_some());
+    drop(daemon);
+    up_down.end(is_driven);
+    flush();
+    Ok(())
+}
+
+/// Starts a master.
+fn master(
+    setup: &Setup,
+    option: &MasterOption,
+    socket: &std::path::Path,
+    opener: &Arc<Opener>,
+) -> Result<Master, String> {
+    let lock = OwnerLock::open(socket, option.master)?;
+    let mut wires = Wires::of(&option.source, &setup.others(option.master), opener)?;
+    if setup.needs_backup {
+        wires.need_all();
+    }
+    let mut settings = Settings::new(option.master, option.source.to_string());
+    settings.lock = Some(lock);
+    settings.interfaces = setup.has_eoe.then(|| EthernetInterfaces::new(option.master));
+    settings.debug_level = setup.debug_level;
+    if let Some(safe) = setup.safe_states.iter().find(|it| it.master == option.master) {
+        settings.safe_state = safe.state;
+    }
+    Ok(Master::start(settings, wires))
+}
+
+/// Looks after the masters until a signal comes, and tells the service manager how they are.
+fn serve(daemon: &Daemon, up_down: &mut UpDown, held: &HeldSignals) {
+    let mut manager = ServiceManager::new(std::process::id(), |name| std::env::var_os(name));
+    let begin = Instant::now();
+    let mut looked = begin;
+    let mut is_ready = !manager.is_there();
+    loop {
+        if manager.is_there() {
+            let all: Vec<Status> = daemon.masters().iter().map(Status::of).collect();
+            is_ready |= begin.elapsed() >= FIRST_SCAN || all.iter().all(|it| it.is_ready);
+            let shown: Vec<&str> = all.iter().map(|it| it.text.as_str()).collect();
+            manager.report(&shown.join("; "), is_ready);
+            manager.live();
+        }
+        let until_look = LOOK.saturating_sub(looked.elapsed());
+        if held.wait(manager.interval(if is_ready { until_look } else { SOON })).is_some() {
+            break;
+        }
+        if looked.elapsed() >= LOOK {
+            looked = Instant::now();
+            up_down.look();
+            daemon.look_after();
+        }
+    }
+    manager.stop();
+}
+
+/// How a master is, for the operator.
+#[derive(Debug, PartialEq, Eq)]
+struct Status {
+    text: String,
+    /// It answers, or waits for something that has been said.
+    is_ready: bool,
+}
+
+impl Status {
+    fn of(master: &Master) -> Status {
+        let number = master.number();
+        let state = master.state();
+        let (text, is_ready) = match (state.owner, state.fault) {
+            (_, Some(fault)) => (format!("master {number} is not driven: {fault}"), true),
+            (Some(owner), None) => (format!("master {number} is driven by {owner}"), true),
+            (None, None) => match master.ask(Ask::State, Vec::new()) {
+                Ok((Answer::State(state), _)) => {
+                    let is_scanned = !matches!(state.activity, Activity::Unscanned | Activity::Scanning);
+                    let count = state.subdevices.len();
+                    let said = if is_scanned { format!("{count} SubDevices") } else { "scans".to_owned() };
+                    (format!("master {number}: {said}"), is_scanned)
+                }
+                _ => (format!("master {number} changes hands"), false),
+            },
+        };
+        Status { text, is_ready }
+    }
+}

@@ -1,0 +1,187 @@
+//! The program as a service: its configuration file, and what the service manager is told.
+
+use std::ffi::OsString;
+use std::os::unix::net::UnixDatagram;
+use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use crate::bench::{LONG, directory, ring, turn};
+use crate::program::fails;
+use crate::running::{PROGRAM, Running, Start, wait_for};
+
+/// What the service manager would receive.
+struct Manager {
+    socket: UnixDatagram,
+    seen: Vec<String>,
+}
+
+impl Manager {
+    fn at(path: &Path) -> Manager {
+        let socket = UnixDatagram::bind(path).expect("it is free");
+        socket.set_read_timeout(Some(Duration::from_millis(50))).expect("a socket");
+        Manager { socket, seen: Vec::new() }
+    }
+
+    /// Reads until something holds for all lines that have come.
+    fn wait_until(&mut self, what: &str, holds: impl Fn(&[String]) -> bool) {
+        let begin = Instant::now();
+        while !holds(&self.seen) {
+            assert!(begin.elapsed() < LONG, "{what}: {:?}", self.seen);
+            let mut buffer = [0; 2048];
+            if let Ok(length) = self.socket.recv(&mut buffer) {
+                let text = String::from_utf8_lossy(&buffer[..length]).into_owned();
+                self.seen.extend(text.lines().map(str::to_owned));
+            }
+        }
+    }
+}
+
+/// A configuration file with masters on simulated rings of so many SubDevices, and further lines.
+fn file(directory: &Path, counts: &[usize], further: &str) -> String {
+    let mut text = further.to_owned();
+    for (master, count) in counts.iter().enumerate() {
+        let segment = directory.join(format!("{master}.toml"));
+        std::fs::write(&segment, ring(*count)).expect("it can be written");
+        text += &format!("RINGCAT_MASTER{master}_SIM=\"{}\"\n", segment.display());
+    }
+    let path = directory.join("ethercat.conf");
+    std::fs::write(&path, text).expect("it can be written");
+    path.to_str().expect("text").to_owned()
+}
+
+// covers: daemon
+#[test]
+fn a_configuration_file_takes_the_place_of_options() {
+    let (turn, directory) = (turn(), directory());
+    let conf = file(&directory, &[3, 4], "# ours\nDEVICE_MODULES=\"generic\"\nRINGCAT_MASTER1_SAFE_STATE=SAFEOP\n");
+    let running = Running::at(&Start { options: &["--conf", &conf], ..Start::default() }, directory, turn);
+    let mut client = running.client();
+    wait_for(&mut client, 0, 3);
+    wait_for(&mut client, 1, 4);
+}
+
+// covers: daemon
+#[test]
+fn the_program_ends_with_all_mistakes_of_its_file_and_changes_nothing() {
+    let directory = directory();
+    let socket = directory.join("socket");
+    let socket = socket.to_str().expect("it is text");
+    let conf = file(&directory, &[2], "MASTER0_DEVCE=eth0\nRINGCAT_MODE=0999\n");
+    let text = fails(&["--conf", &conf, "--socket", socket]);
+    assert!(text.contains(&format!("ringcatd: {conf}:1: MASTER0_DEVCE: expected MASTERx_DEVICE")), "{text}");
+    assert!(text.contains(&format!("ringcatd: {conf}:2: RINGCAT_MODE: expected octal digits")), "{text}");
+    assert!(!Path::new(socket).exists());
+    assert!(fails(&["--conf", "/nonexistent.conf"]).contains("/nonexistent.conf: No such file"));
+    assert!(fails(&["--conf", &conf, "--master", "0=eth1"]).contains("cannot be used with"));
+    std::fs::remove_dir_all(directory).expect("it is there");
+}
+
+// covers: daemon
+#[test]
+fn a_check_says_what_was_understood_and_its_exit_code_whether_it_is_right() {
+    let directory = directory();
+    let socket = directory.join("socket");
+    let further = format!("MASTER1_DEVICE=no-such\nRINGCAT_SOCKET={}\nUPDOWN_INTERFACES=no-such\n", socket.display());
+    let conf = file(&directory, &[2], &further);
+    let check = |options: &[&str]| {
+        let output = Command::new(PROGRAM).arg("--check").args(options).output().expect("it starts");
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        (output.status.code(), said, String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let (code, said, wrong) = check(&["--conf", &conf]);
+    assert_eq!((code, wrong.as_str()), (Some(0), ""), "{said}");
+    let lines = [
+        "line 1: MASTER1_DEVICE: master 1 on interface no-such",
+        "line 3: UPDOWN_INTERFACES: switched on with the daemon, and off with it: no-such",
+        "master 1: main interface no-such: waits, ",
+    ];
+    for line in lines {
+        assert!(said.contains(line), "{line}: {said}");
+    }
+    // Nothing was made, and no process of a segment is left.
+    let mut left: Vec<OsString> =
+        std::fs::read_dir(&directory).expect("it is there").flatten().map(|it| it.file_name()).collect();
+    left.sort();
+    assert_eq!(left, ["0.toml", "ethercat.conf"]);
+    std::fs::write(&conf, "A=$1\nB=`id`\n").expect("it can be written");
+    let (code, _, wrong) = check(&["--conf", &conf]);
+    assert_eq!((code, wrong.lines().count()), (Some(2), 2), "{wrong}");
+    let (_, said, _) = check(&[]);
+    let rule =
+        ["/etc/ethercat.conf counts, since systemd runs", "/etc/sysconfig/ethercat counts, since systemd does not"];
+    assert!(rule.iter().any(|rule| said.starts_with(rule)), "{said}");
+    std::fs::remove_dir_all(directory).expect("it is there");
+}
+
+// covers: daemon
+#[test]
+fn the_service_manager_is_told_ready_state_life_and_end() {
+    let (turn, directory) = (turn(), directory());
+    let conf = file(&directory, &[3], "MASTER1_DEVICE=no-such\n");
+    let path = directory.join("notify");
+    let mut manager = Manager::at(&path);
+    let variables = [("NOTIFY_SOCKET", path.into_os_string()), ("WATCHDOG_USEC", "400000".into())];
+    let start = Start { options: &["--conf", &conf], variables: &variables, ..Start::default() };
+    let mut running = Running::at(&start, directory, turn);
+    let status = |line: &String| line.starts_with("STATUS=master 0: 3 SubDevices; master 1 is not driven: ");
+    manager.wait_until("ready", |seen| seen.iter().any(|line| line == "READY=1"));
+    // The first state after it: master 0 is scanned, and what master 1 waits for was said.
+    let ready = manager.seen.iter().position(|line| line == "READY=1").expect("it was seen");
+    assert!(status(&manager.seen[ready + 1]), "{:?}", manager.seen);
+    assert!(running.lines().iter().any(|line| line.contains("master 1 is not driven: ")), "{:?}", running.lines());
+    let mut client = running.client();
+    wait_for(&mut client, 0, 3);
+    let before = manager.seen.len();
+    manager.wait_until("it lives", |seen| seen[before..].iter().filter(|line| *line == "WATCHDOG=1").count() >= 5);
+    running.signal("-TERM");
+    manager.wait_until("it ends", |seen| seen.iter().any(|line| line == "STOPPING=1"));
+    assert_eq!(manager.seen.iter().filter(|line| *line == "READY=1").count(), 1);
+    assert!(running.child.wait().expect("it ends").success());
+}
+
+/// The exit code and what was printed on both streams.
+fn control(conf: &str, verb: &str) -> (Option<i32>, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_ethercatctl")).args([verb, "--conf", conf]).output();
+    let output = output.expect("it starts");
+    let said = [output.stdout, output.stderr].concat();
+    (output.status.code(), String::from_utf8_lossy(&said).into_owned())
+}
+
+// covers: daemon
+#[test]
+fn ethercatctl_starts_asks_restarts_and_stops_the_daemon() {
+    let (_turn, directory) = (turn(), directory());
+    let further = format!("RINGCAT_SOCKET=\"{}\"\n", directory.join("socket").display());
+    let conf = file(&directory, &[3], &further);
+    assert_eq!(control(&conf, "status"), (Some(3), "ringcatd does not run\n".to_owned()));
+    assert_eq!(control(&conf, "stop").0, Some(0));
+    let (code, said) = control(&conf, "start");
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.ends_with("master 0: 3 SubDevices\n"), "{said}");
+    let pid = || {
+        let (code, said) = control(&conf, "status");
+        assert_eq!(code, Some(0), "{said}");
+        assert!(said.contains("master 0 (sim:") && said.ends_with("): idle\n"), "{said}");
+        said.split(['(', ')']).nth(1).expect("its process").to_owned()
+    };
+    let first = pid();
+    assert!(control(&conf, "start").1.contains("runs already"));
+    assert_eq!(pid(), first);
+    assert_eq!(control(&conf, "restart").0, Some(0));
+    let second = pid();
+    assert_ne!(second, first);
+    // With a wrong file the daemon that runs goes on.
+    let right = std::fs::read(&conf).expect("it is there");
+    std::fs::write(&conf, [&right[..], b"RINGCAT_MOOD=1\n"].concat()).expect("it can be written");
+    for verb in ["restart", "check"] {
+        let (code, said) = control(&conf, verb);
+        assert!(code != Some(0) && said.contains(&format!("{conf}:3: RINGCAT_MOOD: ")), "{said}");
+    }
+    std::fs::write(&conf, right).expect("it can be written");
+    assert_eq!(pid(), second);
+    assert_eq!(control(&conf, "check").0, Some(0));
+    assert_eq!(control(&conf, "stop").0, Some(0));
+    assert_eq!(control(&conf, "status").0, Some(3));
+    std::fs::remove_dir_all(directory).expect("it is there");
+}
