@@ -40,16 +40,21 @@ on_the_wire() {
     echo "the tests on real interfaces took $((SECONDS - begin)) s, of 360 that they may take"
 }
 
-# tried ARGUMENTS...: `cargo test ARGUMENTS` one test at a time; those that do not hold have three tries. Each is shown,
-# and "FAILED" stands behind what did not hold in the third: this machine may have stalled in those before.
+# tried ARGUMENTS...: `cargo test ARGUMENTS` one test at a time; those that do not hold have three tries. Each is shown
+# at its end, and "FAILED" stands behind what did not hold in the third: this machine may have stalled in those before.
+# The output goes to a file: a program that a failing test left behind would keep a pipe open, and the step would wait
+# for it. A try has 900 s.
 tried() {
-    local try names=() mark='s/FAILED$/did not hold, and is tried again/; s/^failures:$/what did not hold:/
+    local try status names=() mark='s/FAILED$/did not hold, and is tried again/; s/^failures:$/what did not hold:/
         s/^test result: FAILED\./test result: tried again./'
     for try in 1 2 3; do
         [[ $try != 3 ]] || mark=
-        if cargo test "$@" -- --nocapture --test-threads 1 "${names[@]}" 2>&1 | tee "$logs/try" | sed -u "$mark"; then
-            return 0
-        fi
+        status=0
+        timeout --kill-after 10 900 cargo test "$@" -- --nocapture --test-threads 1 "${names[@]}" >"$logs/try" 2>&1 ||
+            status=$?
+        sed "$mark" "$logs/try"
+        [[ $status != 0 ]] || return 0
+        [[ $status != 124 && $status != 137 ]] || echo "stopped after 900 s"
         # The runner names at its end what failed; without names it was not built.
         mapfile -t names < <(sed -n '/^failures:$/,/^test result/s/^    \([a-z0-9_:]*\)$/\1/p' "$logs/try" | sort -u)
         echo "try $try of 3 did not hold: ${names[*]:-nothing was run}"
