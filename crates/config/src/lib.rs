@@ -3,8 +3,8 @@
 //!
 //! [`eni`] reads an ENI (EtherCAT Network Information, ETG.2100; protocol 8) into a typed model that keeps the content
 //! of the file; [`follow`] converts it into a [`Configuration`], [`export()`] writes one as an ENI. The network
-//! configuration in the file takes precedence over the SII. Notices list the settings that are not followed. `esi` reads
-//! descriptions of devices; with the feature `network`, `network` reads and writes network files of RingCAT.
+//! configuration in the file takes precedence over the SII. Notices list the settings that are not followed. `esi`
+//! reads descriptions of devices; with the feature `network`, `network` reads and writes network files of RingCAT.
 #![forbid(unsafe_code)]
 
 mod compare;

@@ -231,7 +231,7 @@ fn a_device_is_shown_and_declared_with_choices_or_refused_by_file_line_and_devic
     assert_eq!(place.read("machine.toml"), text, "the file is as it was");
 }
 
-// covers: eni-export
+// covers: eni-run
 #[test]
 fn an_eni_is_exported_from_a_network_file_to_a_file_or_to_the_standard_output() {
     let place = Place::new("eni-export");
@@ -259,7 +259,7 @@ fn an_eni_is_exported_from_a_network_file_to_a_file_or_to_the_standard_output() 
     assert_eq!(place.read("machine.xml"), text, "it is as it was");
 }
 
-// covers: eni-export
+// covers: eni-run
 #[test]
 fn a_network_that_an_eni_cannot_express_is_refused_with_the_reason_and_no_file() {
     let place = Place::new("eni-refused");

@@ -268,7 +268,7 @@ impl Commands {
             }
         };
         let comment = command.comment.as_deref().unwrap_or_default();
-        let transitions = [super::subdevice::transition(command.transition)];
+        let transitions = [super::transitions::transition(command.transition)];
         let mut made = self.command(&transitions, comment, code, *address, data, validate);
         (made.retries, made.datagram.count) = (*retries, required.then_some(1));
         self.list.push(made);

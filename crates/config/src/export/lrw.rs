@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use ringcat_engine::layout::LrwPolicy;
 use ringcat_engine::main_device::Declaration;
 
-use super::LrwUse;
+use super::options::LrwUse;
 
 /// Indices of SubDevices.
 pub(super) type Lrw = BTreeSet<usize>;

@@ -4,7 +4,7 @@ use ringcat_engine::config::{IdnWrite, IpSettings, SdoDownload, SdoUpload, Start
 
 use super::init_commands::ms;
 use super::order::{Order, Section, place};
-use super::subdevice::transition;
+use super::transitions::transition;
 use crate::eni::{CoeCommand, EoeCommand, Mailbox, SoeCommand};
 use crate::ip;
 

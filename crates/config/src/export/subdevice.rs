@@ -1,6 +1,6 @@
 //! `Slave`: the parts of a SubDevice.
 
-use ringcat_engine::config::{ConfigAddress, Transition as EngineTransition};
+use ringcat_engine::config::ConfigAddress;
 use ringcat_wire::address::Position;
 
 use super::details::SubDeviceDetails;
@@ -10,7 +10,7 @@ use super::layout::Layout;
 use super::order::{Section, order, place};
 use super::{clocks, mailbox, process_data};
 use crate::configuration::Configuration;
-use crate::eni::{HotConnect, Place, PreviousPort, SubDevice, Transition};
+use crate::eni::{HotConnect, Place, PreviousPort, SubDevice};
 use crate::xml::one_line;
 
 pub(super) fn subdevice(
@@ -50,17 +50,6 @@ pub(super) fn subdevice(
         clock: clocks::of_subdevice(whole, index),
         ..SubDevice::default()
     })
-}
-
-/// The transition of a file.
-pub(super) const fn transition(of: EngineTransition) -> Transition {
-    match of {
-        EngineTransition::Ip => Transition::Ip,
-        EngineTransition::Ps => Transition::Ps,
-        EngineTransition::So => Transition::So,
-        EngineTransition::Os => Transition::Os,
-        EngineTransition::Sp => Transition::Sp,
-    }
 }
 
 /// `AutoIncAddr`: with groups SubDevices count in the order of the file.

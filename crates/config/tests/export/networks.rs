@@ -8,7 +8,7 @@ use ringcat_wire::al::AlState;
 
 use crate::{CELL, model, network};
 
-// covers: eni-export
+// covers: eni-run
 #[test]
 fn the_eni_of_a_network_file_declares_the_network_of_the_file() {
     let file = network(CELL);
@@ -52,7 +52,7 @@ fn the_eni_of_a_network_file_declares_the_network_of_the_file() {
     assert_eq!((clocks.reference, clocks.bus_shift), (ReferenceClock::Declared(SubDeviceId(1)), true));
 }
 
-// covers: eni-export
+// covers: eni-run
 #[test]
 fn sync_managers_mailboxes_and_domains_of_a_network_file_are_in_its_eni() {
     let export = network(CELL).to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
@@ -107,7 +107,7 @@ fn sync_managers_mailboxes_and_domains_of_a_network_file_are_in_its_eni() {
     assert_eq!((pdo.name.as_str(), pdo.entries[1].name.as_str()), ("Command", "Target > \"0\""));
 }
 
-// covers: eni-export
+// covers: eni-run
 #[test]
 fn each_domain_of_a_network_file_has_an_lrw_of_its_own() {
     let export = network(CELL)
@@ -120,7 +120,7 @@ fn each_domain_of_a_network_file_has_an_lrw_of_its_own() {
 }
 
 /// The inputs of the drive would replace the outputs for the tool behind it.
-// covers: eni-export
+// covers: eni-run
 #[test]
 fn inputs_that_would_replace_outputs_in_an_lrw_are_behind_the_outputs() {
     let mut file = network(CELL);
@@ -136,7 +136,7 @@ fn inputs_that_would_replace_outputs_in_an_lrw_are_behind_the_outputs() {
     assert_eq!(apart.configuration.image.inputs_len + image.outputs_len, image.inputs_len);
 }
 
-// covers: eni-export
+// covers: eni-run
 #[test]
 fn names_of_any_characters_give_a_well_formed_file() {
     let file = network(CELL);

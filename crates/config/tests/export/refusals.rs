@@ -18,7 +18,7 @@ fn refusal(change: impl FnOnce(&mut NetworkFile)) -> String {
     file.to_eni(&ExportOptions::default()).expect_err("an ENI cannot express it").to_string()
 }
 
-// covers: eni-export
+// covers: eni-run
 #[test]
 fn settings_without_which_another_network_results_are_refused_by_name() {
     let of_drive =
@@ -46,7 +46,7 @@ fn settings_without_which_another_network_results_are_refused_by_name() {
     expect(refusal(|file| file.clocks = None), &format!("{drive}SYNC signals"));
 }
 
-// covers: eni-export
+// covers: eni-run
 #[test]
 fn commands_that_the_maindevice_sends_itself_are_refused_as_start_up_commands() {
     let mut configuration = configured(SMALL);
@@ -57,14 +57,14 @@ fn commands_that_the_maindevice_sends_itself_are_refused_as_start_up_commands() 
     assert!(error.to_string().contains("start-up commands") || error.what == "the written file", "{error}");
 }
 
-// covers: eni-export
+// covers: eni-run
 #[test]
 fn a_network_without_subdevices_is_refused() {
     let error = export(&Configuration::default(), &ExportDetails::default(), &ExportOptions::default());
     assert_eq!(error.expect_err("nothing is there").to_string(), "network: it has no SubDevice");
 }
 
-// covers: eni-export
+// covers: eni-run
 #[test]
 fn settings_that_an_eni_has_no_place_for_are_listed() {
     let mut file = network(CELL);

@@ -69,7 +69,7 @@ fn assert_same(name: &str, expected: &Configuration, got: &Configuration) {
     assert_eq!(lrw(expected), lrw(got), "{name}");
 }
 
-// covers: eni-export
+// covers: eni-run
 #[test]
 fn the_model_of_every_file_is_the_same_when_it_is_written_and_read() {
     for (name, text) in files() {
@@ -81,7 +81,7 @@ fn the_model_of_every_file_is_the_same_when_it_is_written_and_read() {
     }
 }
 
-// covers: eni-export
+// covers: eni-run
 #[test]
 fn every_eni_gives_the_same_declaration_when_it_is_exported_and_read() {
     for (name, text) in files() {
@@ -94,7 +94,7 @@ fn every_eni_gives_the_same_declaration_when_it_is_exported_and_read() {
     }
 }
 
-// covers: eni-export
+// covers: eni-run
 #[test]
 fn an_eni_is_exported_with_lrw_and_without_it() {
     for (name, text) in files() {
@@ -125,7 +125,7 @@ fn mutants(text: &str) -> impl Iterator<Item = String> + '_ {
     })
 }
 
-// covers: eni-export
+// covers: eni-run
 #[test]
 fn a_changed_number_gives_the_same_declaration_again_or_a_refusal() {
     let (mut same, mut refused) = (0, 0);

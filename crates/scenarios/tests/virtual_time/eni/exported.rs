@@ -51,7 +51,7 @@ fn proven(mut plant: Plant, seed: u64) -> [usize; 2] {
     plant.compare(&mut Dice::new(seed))
 }
 
-// covers: eni-export
+// covers: eni-run
 #[test]
 fn the_eni_of_a_scan_reaches_op_on_its_bus_with_each_variable_in_its_place() {
     let file = scanned();
@@ -64,7 +64,7 @@ fn the_eni_of_a_scan_reaches_op_on_its_bus_with_each_variable_in_its_place() {
 }
 
 /// One LRW for all is for a line: a ring refuses it.
-// covers: eni-export
+// covers: eni-run
 #[test]
 fn the_eni_of_a_scan_with_lrw_reaches_op_on_a_line() {
     let export = scanned().to_eni(&ExportOptions::default().with_lrw(LrwUse::Always)).expect("it has an ENI");
@@ -75,7 +75,7 @@ fn the_eni_of_a_scan_with_lrw_reaches_op_on_a_line() {
     assert!(outputs >= 16 + 2 * 3, "{outputs} outputs");
 }
 
-// covers: eni-export
+// covers: eni-run
 #[test]
 fn a_segment_made_of_an_exported_eni_reaches_op() {
     let export = scanned().to_eni(&ExportOptions::default()).expect("it has an ENI");
@@ -83,7 +83,7 @@ fn a_segment_made_of_an_exported_eni_reaches_op() {
     proven(activate_on(network, read(&export), false).expect("its own segment"), 4);
 }
 
-// covers: eni-export
+// covers: eni-run
 #[test]
 fn an_exported_eni_reaches_op_on_the_segment_of_the_eni_it_was_made_of() {
     let files = REAL.iter().filter_map(|(name, _)| real(name)).chain([machine()]);
