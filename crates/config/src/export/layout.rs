@@ -118,9 +118,12 @@ fn stream(area: &ImageArea, lrw: &Lrw) -> Stream {
     }
 }
 
-/// The domain of each SyncManager.
+/// A part of a SubDevice in a domain: the domain, the SyncManagers; `None`: all.
+type Part<'a> = (usize, Option<&'a [u8]>);
+
+/// The domain of each SyncManager, by SubDevice.
 struct Domains<'a> {
-    members: HashMap<usize, Vec<(usize, Option<&'a [u8]>)>>,
+    members: HashMap<usize, Vec<Part<'a>>>,
 }
 
 impl<'a> Domains<'a> {
