@@ -5,7 +5,7 @@ use std::io;
 use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ringcat_link::process::wait_readable;
 
@@ -18,6 +18,10 @@ use crate::wire::{Limits, WireError};
 const GREETING: Duration = Duration::from_secs(5);
 /// Wait for an answer beyond the time that the question may take.
 const BEYOND: Duration = Duration::from_secs(30);
+/// A question waits so long while the master passes from one process to another.
+const CHANGE: Duration = Duration::from_secs(5);
+/// Interval of tries meanwhile.
+const PAUSE: Duration = Duration::from_millis(5);
 
 /// Why a daemon gave no answer.
 #[derive(Debug)]
@@ -152,6 +156,25 @@ impl Client {
         }
     }
 
+    /// As [`Client::ask`]. While the master passes from one process to another, or its owner has as many questions as it
+    /// may have, it is asked again, for up to 5 s.
+    ///
+    /// # Errors
+    /// As [`Client::ask`].
+    pub fn ask_patiently(&mut self, master: u32, what: &Ask, bytes: &[u8]) -> Result<(Answer, Vec<u8>), ClientError> {
+        let begin = Instant::now();
+        loop {
+            match self.ask(master, what.clone(), bytes.to_vec()) {
+                Err(ClientError::Refused(Refusal::Changing { .. } | Refusal::TooManyQuestions { .. }))
+                    if begin.elapsed() < CHANGE =>
+                {
+                    std::thread::sleep(PAUSE);
+                }
+                answered => return answered,
+            }
+        }
+    }
+
     /// Whether the daemon has neither ended the connection nor said anything that was not asked for: between two
     /// questions it says nothing but why it ends the connection.
     pub fn is_open(&self) -> bool {
@@ -166,4 +189,60 @@ impl Client {
 
 fn unexpected(expected: &str) -> ClientError {
     ClientError::Refused(Refusal::Unexpected { expected: expected.to_owned() })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::net::UnixListener;
+
+    use super::*;
+
+    /// A daemon that refuses so many questions before it answers one; the number of questions that it got.
+    fn refusing(refusals: Vec<Refusal>) -> (PathBuf, std::thread::JoinHandle<usize>) {
+        static NUMBER: std::sync::atomic::AtomicU32 = std::sync::atomic::AtomicU32::new(0);
+        let number = NUMBER.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        let socket = std::env::temp_dir().join(format!("ringcat-client-{}-{number}", std::process::id()));
+        let listener = UnixListener::bind(&socket).expect("it is free");
+        let daemon = std::thread::spawn(move || {
+            let connection = Connection::new(listener.accept().expect("a client").0).expect("it is open");
+            connection.receive(Limits::OWNER, Some(GREETING)).expect("a greeting");
+            let welcome = Content::Welcome { right: Right::Change, pid: std::process::id() };
+            connection.send(&welcome.into()).expect("the client listens");
+            let (mut refusals, mut questions) = (refusals.into_iter(), 0);
+            while let Ok(message) = connection.receive(Limits::OWNER, Some(GREETING)) {
+                let Content::Ask(Numbered { id, master, .. }) = message.content else { panic!("{message:?}") };
+                questions += 1;
+                let what = refusals.next().map_or_else(|| Ok(Answer::Masters(Vec::new())), Err);
+                connection.send(&Content::Answer(Numbered { id, master, what }).into()).expect("the client listens");
+            }
+            questions
+        });
+        (socket, daemon)
+    }
+
+    fn ask(refusals: Vec<Refusal>) -> (Result<(Answer, Vec<u8>), ClientError>, usize) {
+        let (socket, daemon) = refusing(refusals);
+        let mut client = Client::connect(&socket, "test").expect("it listens");
+        let answered = client.ask_patiently(0, &Ask::Masters, &[]);
+        drop(client);
+        std::fs::remove_file(socket).expect("it is there");
+        (answered, daemon.join().expect("it ends"))
+    }
+
+    // covers: daemon
+    #[test]
+    fn a_question_is_asked_again_while_the_master_changes_hands() {
+        let (answered, questions) = ask(vec![Refusal::Changing { master: 0 }; 3]);
+        assert!(matches!(answered, Ok((Answer::Masters(_), _))), "{answered:?}");
+        assert_eq!(questions, 4);
+    }
+
+    // covers: daemon
+    #[test]
+    fn other_refusals_are_final() {
+        let fault = || Refusal::Fault { master: 0, cause: "no interface".to_owned() };
+        let (answered, questions) = ask(vec![Refusal::Changing { master: 0 }, fault()]);
+        assert!(matches!(answered, Err(ClientError::Refused(refusal)) if refusal == fault()));
+        assert_eq!(questions, 2);
+    }
 }

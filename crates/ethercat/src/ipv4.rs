@@ -37,12 +37,12 @@ pub fn with_prefix(text: &str) -> Result<(Ipv4Addr, Option<Ipv4Addr>), Failure> 
     Ok((address(host)?, Some(Ipv4Addr::from(mask))))
 }
 
-/// A MAC address: six bytes in hexadecimal with colons between them.
+/// A MAC address: six bytes in hexadecimal with colons or hyphens between them (manual 7.1.13).
 ///
 /// # Errors
 /// It is none.
 pub fn mac(text: &str) -> Result<[u8; 6], Failure> {
-    let parts: Vec<&str> = text.split(':').collect();
+    let parts: Vec<&str> = text.split(if text.contains(':') { ':' } else { '-' }).collect();
     if parts.len() < 6 {
         return Err(Failure::usage("Incomplete MAC address!"));
     }
@@ -69,8 +69,17 @@ mod tests {
         assert_eq!(mask("10.0.0.1").expect("it is one"), None);
         assert_eq!(mask("10.0.0.1/40").expect_err("it is long").text(), "Invalid prefix '40'!\n");
         assert_eq!(mac("02:0:00:00:00:fF").expect("it is one"), [2, 0, 0, 0, 0, 255]);
+        assert_eq!(mac("02-0-00-00-00-fF").expect("it is one"), [2, 0, 0, 0, 0, 255]);
+        assert_eq!(mac("02-00-00").expect_err("it is short").text(), "Incomplete MAC address!\n");
         assert_eq!(mac("02:00:00").expect_err("it is short").text(), "Incomplete MAC address!\n");
-        for text in ["02:00:00:00:00:xx", "02:00:00:00:00:100", "02:00:00:00:00:", "1:2:3:4:5:6:7", "+1:2:3:4:5:6"] {
+        for text in [
+            "02:00:00:00:00:xx",
+            "02:00:00:00:00:00-1",
+            "02:00:00:00:00:100",
+            "02:00:00:00:00:",
+            "1:2:3:4:5:6:7",
+            "+1:2:3:4:5:6",
+        ] {
             assert_eq!(mac(text).expect_err("it is wrong").text(), "Invalid MAC address!\n", "{text}");
         }
     }

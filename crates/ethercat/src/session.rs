@@ -90,7 +90,7 @@ impl<'a> Session<'a> {
     /// # Errors
     /// The daemon refuses, or is not there.
     pub fn ask(&mut self, master: u32, ask: Ask, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), Failure> {
-        Ok(self.client()?.ask(master, ask, bytes)?)
+        Ok(self.client()?.ask_patiently(master, &ask, &bytes)?)
     }
 
     /// Asks a question of the tool.
@@ -156,6 +156,21 @@ impl<'a> Session<'a> {
             return Err(Failure::failed(format!("Failed to open master {missing}: {refusal}")));
         }
         Ok(all.into_iter().filter(|master| list.has(master.master)).collect())
+    }
+
+    /// The selected SubDevices of a master in a list of several masters. A master that nothing drives, because it waits
+    /// for its interface, has none; the standard error says why.
+    ///
+    /// # Errors
+    /// As [`Session::slaves`].
+    pub fn listed_slaves(&mut self, master: u32) -> Result<Vec<Slave>, Failure> {
+        match self.slaves(master) {
+            Err(Failure::Asked(ClientError::Refused(refusal @ Refusal::Fault { .. }))) => {
+                self.say(&refusal.to_string());
+                Ok(Vec::new())
+            }
+            slaves => slaves,
+        }
     }
 
     /// The only master of a command that needs one.

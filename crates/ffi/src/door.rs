@@ -3,7 +3,6 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::time::{Duration, Instant};
 
 use ringcat::SupervisorThread;
 use ringcat::daemon::{Answer, Ask, Client, ClientError, Refusal, SegmentLook, ServiceFault, serving};
@@ -12,10 +11,6 @@ use crate::code::{Code, Outcome};
 use crate::environment::program_name;
 use crate::locks::locked;
 
-/// A question waits so long while the master passes from one process to another.
-const CHANGE: Duration = Duration::from_secs(5);
-/// Interval of tries meanwhile.
-const PAUSE: Duration = Duration::from_millis(5);
 /// Most data of a question through a daemon, in bytes.
 const MOST_DATA: usize = 64 << 10;
 
@@ -70,18 +65,6 @@ impl DaemonDoor {
             let text = format!("expected at most {MOST_DATA} bytes of data, got {}", bytes.len());
             return Err(Refusal::Service { fault: ServiceFault::TooLong, text });
         }
-        let begin = Instant::now();
-        loop {
-            match self.ask_once(what.clone(), bytes.to_vec()) {
-                Err(Refusal::Changing { .. } | Refusal::TooManyQuestions { .. }) if begin.elapsed() < CHANGE => {
-                    std::thread::sleep(PAUSE);
-                }
-                answered => return answered,
-            }
-        }
-    }
-
-    fn ask_once(&self, what: Ask, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), Refusal> {
         let told = |error: ClientError| match error {
             ClientError::Refused(refusal) => refusal,
             error => Refusal::Failed(error.to_string()),
@@ -90,7 +73,7 @@ impl DaemonDoor {
         let idle = locked(&self.idle).pop().filter(Client::is_open);
         let client = idle.map_or_else(|| Client::connect(&self.socket, &program_name()), Ok);
         let mut client = client.map_err(told)?;
-        let answered = client.ask(self.master, what, bytes);
+        let answered = client.ask_patiently(self.master, what, bytes);
         if matches!(answered, Ok(_) | Err(ClientError::Refused(_))) {
             locked(&self.idle).push(client);
         }

@@ -45,7 +45,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let incomplete = run(&mut application, lamp, 2_000);
     println!("{incomplete} incomplete cycles while the cable was cut");
     let status = application.ring_status();
-    println!("ring {:?}, broken at {:?}", status.state, status.place);
+    let place = status.place.map(|cable| Names::default().cable(cable, status.place_ends));
+    println!("ring {:?}, broken {}", status.state, place.as_deref().unwrap_or("at an unknown place"));
     if application.ring() != RingState::Open || !application.all_settled() {
         return Err("the break was not noticed, or SubDevices have left OP".into());
     }

@@ -30,7 +30,7 @@ sync managers are left out.
 
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     for master in session.masters()? {
-        for slave in session.slaves(master.master)? {
+        for slave in session.listed_slaves(master.master)? {
             let details = description(session, master.master, slave.line.position)?;
             session.write(structures(master.master, &slave, &details).as_bytes())?;
         }

@@ -38,7 +38,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let is_several = masters.len() > 1;
     for master in masters {
         let number = master.master;
-        let slaves = session.slaves(number)?;
+        let slaves = session.listed_slaves(number)?;
         let has_header = is_several || slaves.len() > 1;
         for slave in slaves {
             let position = slave.line.position;

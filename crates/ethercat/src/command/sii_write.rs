@@ -17,9 +17,9 @@ pub const COMMAND: Command = Command {
     summary: "Write SII contents to a slave.",
     forms: &["<FILENAME>"],
     help: "One slave must be selected. FILENAME is a file with the whole SII, '-' the
-standard input. It is checked: size, checksum, categories up to their end;
---force writes anyway what may make the slave unusable. The slave uses the
-new contents from its next start on.
+standard input. It is checked: size, also against that of the EEPROM, checksum,
+categories up to their end; --force writes anyway what may make the slave
+unusable. The slave uses the new contents from its next start on.
 ",
     options: super::reg_read::SINGLE,
     run,

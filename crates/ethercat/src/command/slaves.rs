@@ -51,7 +51,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let is_several = masters.len() > 1;
     for master in masters {
         let number = master.master;
-        let slaves = session.slaves(number)?;
+        let slaves = session.listed_slaves(number)?;
         if session.arguments.verbose {
             if slaves.is_empty() {
                 continue;

@@ -30,7 +30,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         _ => return Err(Failure::usage(format!("Invalid state '{text}'!"))),
     };
     for master in session.masters()? {
-        for slave in session.slaves(master.master)? {
+        for slave in session.listed_slaves(master.master)? {
             let position = slave.line.position;
             session.done(master.master, ToolAsk::StartState { position, state }, Vec::new())?;
         }

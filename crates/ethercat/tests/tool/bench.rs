@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 use std::os::unix::net::UnixStream;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
@@ -35,6 +35,27 @@ struct SegmentThread {
     thread: Option<JoinHandle<()>>,
 }
 
+impl SegmentThread {
+    /// A thread that simulates a segment, and the way to it.
+    fn start(segment: Segment) -> (Wires, SegmentThread) {
+        let (near, far) = UnixStream::pair().expect("a pair");
+        let (looks, asked) = channel::<Look>();
+        let network = Network::from_description(segment).expect("it is right");
+        let thread = std::thread::spawn(move || simulate(PipedSegment::new(network), &far, &asked));
+        let wires = Wires::to_segment(near).expect("the segment is right");
+        (wires, SegmentThread { looks: Some(looks), thread: Some(thread) })
+    }
+}
+
+impl Drop for SegmentThread {
+    fn drop(&mut self) {
+        self.looks = None;
+        if let Some(thread) = self.thread.take() {
+            assert!(thread.join().is_ok() || std::thread::panicking());
+        }
+    }
+}
+
 /// A daemon with masters 0, 1 and so on.
 pub struct Bench {
     pub socket: PathBuf,
@@ -63,13 +84,13 @@ pub fn directory() -> PathBuf {
 }
 
 /// Runs the tool with this socket.
-pub fn tool(socket: &std::path::Path, arguments: &[&str]) -> Done {
+pub fn tool(socket: &Path, arguments: &[&str]) -> Done {
     let words: Vec<OsString> = arguments.iter().map(OsString::from).collect();
     tool_with(socket, &words)
 }
 
 /// The same with any words.
-pub fn tool_with(socket: &std::path::Path, words: &[OsString]) -> Done {
+pub fn tool_with(socket: &Path, words: &[OsString]) -> Done {
     let mut command = Command::new(PROGRAM);
     command.args(words).env("RINGCAT_SOCKET", socket).stdin(Stdio::null());
     let output = command.output().expect("it starts");
@@ -89,18 +110,29 @@ impl Bench {
 
     /// The same with a directory that has files already.
     pub fn start_in(directory: PathBuf, segments: Vec<Segment>) -> Bench {
+        Bench::start_with(directory, segments, Vec::new())
+    }
+
+    /// The same with a last master whose links cannot be opened.
+    pub fn start_beside_a_waiting_master(segments: Vec<Segment>) -> Bench {
+        let (wires, gone) = SegmentThread::start(
+            Segment::from_toml("[[device]]\ntype = \"coupler\"\n", Path::new(".")).expect("it is right"),
+        );
+        drop(gone);
+        let waiting = Master::new(segments.len() as u32, "eth9".to_owned(), wires);
+        Bench::start_with(directory(), segments, vec![waiting])
+    }
+
+    fn start_with(directory: PathBuf, segments: Vec<Segment>, waiting: Vec<Master>) -> Bench {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let counts: Vec<usize> = segments.iter().map(|segment| segment.devices.len()).collect();
         let (mut masters, mut threads) = (Vec::new(), Vec::new());
         for (number, segment) in (0..).zip(segments) {
-            let (near, far) = UnixStream::pair().expect("a pair");
-            let (looks, asked) = channel::<Look>();
-            let network = Network::from_description(segment).expect("it is right");
-            let thread = std::thread::spawn(move || simulate(PipedSegment::new(network), &far, &asked));
-            let wires = Wires::to_segment(near).expect("the segment is right");
+            let (wires, thread) = SegmentThread::start(segment);
             masters.push(Master::new(number, "sim:test".to_owned(), wires));
-            threads.push(SegmentThread { looks: Some(looks), thread: Some(thread) });
+            threads.push(thread);
         }
+        masters.extend(waiting);
         let socket = directory.join("socket");
         let daemon = Daemon::start(masters, &socket, Rights { group: None, mode: 0o666 }, STOP_LIMIT);
         let daemon = Some(daemon.expect("it listens"));
@@ -172,12 +204,7 @@ fn simulate(mut segment: PipedSegment, control: &UnixStream, asked: &Receiver<Lo
 
 impl Drop for Bench {
     fn drop(&mut self) {
-        for segment in &mut self.segments {
-            segment.looks = None;
-            if let Some(thread) = segment.thread.take() {
-                assert!(thread.join().is_ok() || std::thread::panicking());
-            }
-        }
+        self.segments.clear();
         self.daemon = None;
         // It is below the directory for temporary files.
         let _ = std::fs::remove_dir_all(&self.directory);

@@ -43,6 +43,25 @@ fn lists_of_two_masters_have_headers_and_single_commands_ask_for_one() {
 
 // covers: daemon
 #[test]
+fn a_master_that_waits_for_its_interface_lists_none_and_says_why() {
+    let bench = Bench::start_beside_a_waiting_master(vec![ring(2, false)]);
+    let why = "master 1 is not driven: ";
+    for command in [&["slaves"][..], &["slaves", "-v"], &["pdos"], &["cstruct"], &["sdos"], &["states", "PREOP"]] {
+        let done = bench.tool(command);
+        assert!(done.code == Some(0) && done.err.starts_with(why), "{command:?}: {done:?}");
+        let lines = |text: &str| {
+            let lines = text.lines().map(str::trim_start).filter(|line| *line != "Master0" && *line != "Master1");
+            lines.map(str::to_owned).collect::<Vec<String>>()
+        };
+        assert_eq!(lines(&done.out), lines(&bench.good(&[command, &["-m0"]].concat())), "{command:?}");
+    }
+    assert!(bench.good(&["master"]).contains("(waiting...)"));
+    let single = bench.bad(&["upload", "-m1", "-p0", "0x1000", "0"]);
+    assert!(single.starts_with(&format!("ringcatd: {why}")), "{single}");
+}
+
+// covers: daemon
+#[test]
 fn a_broken_ring_is_shown_between_the_slaves() {
     let bench = Bench::start(vec![ring(4, true)]);
     bench.inside(0, |segment| segment.network_mut().apply(Fault::Cut(CableId(2))));

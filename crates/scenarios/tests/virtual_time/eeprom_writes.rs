@@ -85,6 +85,28 @@ fn an_invalid_eeprom_image_is_refused_unless_forced() {
 
 // covers: eeprom
 #[test]
+fn an_image_longer_than_the_eeprom_is_refused_before_a_word_is_written() {
+    let mut world = world(7);
+    let before = image(&world);
+    let there = before.len() / 2;
+    let mut longer = before.clone();
+    longer[0x90] ^= 0x20;
+    longer.extend([0x34, 0x12]);
+    let too_long = SiiProgramError::TooLong { words: there + 1, there };
+    assert_eq!(write(&mut world, &longer, false), Err(too_long));
+    assert_eq!(image(&world), before, "nothing was written");
+    assert_eq!(
+        too_long.to_string(),
+        format!("SII: the image has {} words, the EEPROM says in word 0x3e that it has {there}", there + 1)
+    );
+    // With force it is tried: what the EEPROM has, is written, and where it ends, is reported.
+    let forced = write(&mut world, &longer, true);
+    assert!(matches!(forced, Err(SiiProgramError::Command { word, .. }) if word as usize == there), "{forced:?}");
+    assert_eq!(image(&world)[0x90], longer[0x90]);
+}
+
+// covers: eeprom
+#[test]
 fn a_slow_busy_or_protected_eeprom_is_waited_for_or_reported() {
     let mut world = world(3);
     let mut new = image(&world);

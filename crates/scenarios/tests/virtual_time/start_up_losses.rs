@@ -73,8 +73,8 @@ fn a_start_of_a_ring_with_lost_frames_has_no_outliers() {
 
 // covers: SM-04, scan, lost-frames
 #[test]
-fn six_losses_in_a_row_cost_a_start_less_than_25_ms() {
-    for (count, limit_ms) in [(1, 25), (10, 25)] {
+fn six_losses_in_a_row_cost_a_start_less_than_17_ms() {
+    for (count, limit_ms) in [(1, 17), (10, 17)] {
         let (usual, _) = start(drives(count), 0, 0);
         let mut most = Duration::ZERO;
         for at_us in (2_000..20_000).step_by(1_300) {

@@ -240,7 +240,10 @@ impl Eeprom {
             if self.bus.now() >= self.until {
                 return Err(SiiReadError::TooSlow { word: given.word });
             }
-            early = Some(elapsed);
+            // After a lost reply the busy command may be the next one: this one has ended before.
+            if poll.address == given.word {
+                early = Some(elapsed);
+            }
             self.bus.sleep(Pace::next(elapsed)).await;
         }
     }

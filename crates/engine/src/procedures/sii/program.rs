@@ -33,6 +33,10 @@ const CONFIGURATION: Range<usize> = 0..8;
 const ALIAS_WORD: usize = 4;
 /// Word of the checksum.
 const CHECKSUM_WORD: usize = 7;
+/// Word of the size of the EEPROM in KiBit, less one.
+const SIZE_WORD: u32 = 0x3E;
+/// Words of a KiBit.
+const KIBIT: u32 = 64;
 
 /// Why an EEPROM was not written, or not loaded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,6 +86,13 @@ pub enum SiiProgramError {
         /// Bytes.
         bytes: usize,
     },
+    /// The image is longer than the EEPROM, by the size in word 0x3E of its present content.
+    TooLong {
+        /// Words of the image.
+        words: usize,
+        /// Words of the EEPROM.
+        there: usize,
+    },
     /// The present configuration area has a wrong checksum.
     Checksum {
         /// The checksum computed from it.
@@ -118,6 +129,12 @@ impl fmt::Display for SiiProgramError {
             SiiProgramError::EndMarker => f.write_str("SII: the categories do not end with an end marker"),
             SiiProgramError::Length { bytes } => {
                 write!(f, "SII: expected whole words, at least one and at most 64 KiB, got {bytes} bytes")
+            }
+            SiiProgramError::TooLong { words, there } => {
+                write!(
+                    f,
+                    "SII: the image has {words} words, the EEPROM says in word {SIZE_WORD:#04x} that it has {there}"
+                )
             }
             SiiProgramError::Checksum { expected, got } => {
                 write!(f, "the EEPROM has a wrong checksum: expected {expected:#04x}, word 7 is {got:#06x}")
@@ -182,11 +199,9 @@ pub fn check(image: &[u8], force: bool) -> Result<(), SiiProgramError> {
 
 /// Reads the whole EEPROM of one SubDevice; the SII contains its size.
 pub async fn read_all(bus: &Bus, station: StationAddress) -> Result<Vec<u8>, SiiProgramError> {
-    const SIZE_WORD: u32 = 0x3E;
     let access = Access::begin(bus, station).await?;
     let work = async {
-        let size = access.read(SIZE_WORD, 1).await?;
-        let words = (u32::from(u16::from_le_bytes([size[0], size[1]])) + 1) * 64;
+        let words = access.size().await?;
         access.read(0, words.min(MAX_WORDS)).await
     };
     let bytes = work.await;
@@ -194,7 +209,8 @@ pub async fn read_all(bus: &Bus, station: StationAddress) -> Result<Vec<u8>, Sii
     bytes
 }
 
-/// Writes an image; see [`check`].
+/// Writes an image; see [`check`]. One that is longer than the EEPROM says it is needs `force`: what fits would be
+/// written, and the rest fail.
 pub async fn write(
     bus: &Bus,
     station: StationAddress,
@@ -204,7 +220,14 @@ pub async fn write(
     check(image, force)?;
     let words: Vec<u16> = image.as_chunks::<2>().0.iter().map(|pair| u16::from_le_bytes(*pair)).collect();
     let access = Access::begin(bus, station).await?;
-    let written = access.write_words(&words).await;
+    let work = async {
+        let there = if force { words.len() } else { access.size().await? as usize };
+        if words.len() > there {
+            return Err(SiiProgramError::TooLong { words: words.len(), there });
+        }
+        access.write_words(&words).await
+    };
+    let written = work.await;
     access.end().await?;
     written
 }
@@ -278,6 +301,12 @@ impl<'a> Access<'a> {
     async fn read(&self, first: u32, count: u32) -> Result<Vec<u8>, SiiProgramError> {
         let mut eeprom = Eeprom::open(self.bus, self.station, Pace::default()).await?;
         Ok(eeprom.bytes(first, count, None).await?)
+    }
+
+    /// Words of the EEPROM, as its present content says.
+    async fn size(&self) -> Result<u32, SiiProgramError> {
+        let size = self.read(SIZE_WORD, 1).await?;
+        Ok((u32::from(u16::from_le_bytes([size[0], size[1]])) + 1) * KIBIT)
     }
 
     async fn write_words(&self, words: &[u16]) -> Result<SiiWritten, SiiProgramError> {

@@ -135,7 +135,7 @@ fn clocks_of_a_known_segment_lock_as_fast_and_without_a_measurement() {
                 assert!(now.latches <= WITHOUT_MEASUREMENT, "{text}, round {round}: {} latches", now.latches);
                 fastest = fastest.min(now.took);
                 // In a tree of 40 and a ring of 50 some sample may be out of the window, which depends on the moment of
-                // the activation. The next test has the average of a tree.
+                // the activation. The next tests have the averages.
                 let is_exact = count < 40;
                 assert!(
                     !is_exact || now.took <= first.took,
@@ -151,14 +151,12 @@ fn clocks_of_a_known_segment_lock_as_fast_and_without_a_measurement() {
     }
 }
 
-/// The lock of a tree of 40 begins again with each sample out of the window, which the jitter of receive times and the
+/// The lock of many clocks begins again with each sample out of the window, which the jitter of receive times and the
 /// wander of the clocks decide: single runs differ by a tenth of a second. On average known clocks are not slower.
-// covers: dc-lock, states
-#[test]
-fn known_clocks_of_a_tree_of_40_lock_as_fast_on_average() {
+fn known_clocks_lock_as_fast_on_average(kind: &str, count: usize, starts: u64) {
     let (mut first_times, mut known_times) = (Vec::new(), Vec::new());
-    for start in 0..12 {
-        let (mut main_device, frames) = watched(Tap::new(network("tree", 40)));
+    for start in 0..starts {
+        let (mut main_device, frames) = watched(Tap::new(network(kind, count)));
         main_device.attend(Duration::from_millis(1_000 + 97 * start));
         let first = lock(main_device, &frames, "first");
         let (links, bytes) = left(first.application, Handover::Orderly);
@@ -171,8 +169,20 @@ fn known_clocks_of_a_tree_of_40_lock_as_fast_on_average() {
         known_times.push(known.took);
     }
     let sum = |times: &[Duration]| times.iter().sum::<Duration>();
-    println!("{first_times:?}, known {known_times:?}");
-    assert!(sum(&known_times) <= sum(&first_times), "{first_times:?}, known {known_times:?}");
+    println!("{kind} of {count}: {first_times:?}, known {known_times:?}");
+    assert!(sum(&known_times) <= sum(&first_times), "{kind} of {count}: {first_times:?}, known {known_times:?}");
+}
+
+// covers: dc-lock, states
+#[test]
+fn known_clocks_of_a_tree_of_40_lock_as_fast_on_average() {
+    known_clocks_lock_as_fast_on_average("tree", 40, 12);
+}
+
+// covers: dc-lock, states
+#[test]
+fn known_clocks_of_a_ring_of_50_lock_as_fast_on_average() {
+    known_clocks_lock_as_fast_on_average("ring", 50, 8);
 }
 
 // covers: dc-remeasure, states
