@@ -1,13 +1,14 @@
-//! `ringcat eni FILE`: what an ENI says and what follows from it, without any bus.
+//! `ringcat eni FILE`: what an ENI says and what follows from it, without any bus. `ringcat eni export` writes one.
 
 mod details;
+mod export;
 mod json;
 mod words;
 
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::Args;
+use clap::{Args, Subcommand};
 use ringcat::Direction;
 use ringcat::config::Configuration;
 use ringcat::config::eni::{Eni, SubDevice};
@@ -34,10 +35,13 @@ cannot be followed, with the reason on the standard error output.";
 
 /// Options of `ringcat eni`.
 #[derive(Args, Debug)]
-#[command(after_long_help = ABOUT_ENI)]
+#[command(after_long_help = ABOUT_ENI, args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub struct EniArguments {
+    #[command(subcommand)]
+    command: Option<EniCommand>,
     /// The ENI
-    file: PathBuf,
+    #[arg(required = true)]
+    file: Option<PathBuf>,
     /// List SyncManagers, PDOs, start-up commands and variables too
     ///
     /// JSON always has them.
@@ -45,10 +49,32 @@ pub struct EniArguments {
     details: bool,
 }
 
+#[derive(Debug, Subcommand)]
+enum EniCommand {
+    /// Writes the ENI of a network file, or of another ENI
+    ///
+    /// What an ENI cannot express is refused with the reason, or listed. No interface is needed.
+    Export(export::ExportArguments),
+}
+
+impl EniArguments {
+    /// As the command line has it.
+    pub const fn name(&self) -> &'static str {
+        match self.command {
+            Some(EniCommand::Export(_)) => "eni export",
+            None => "eni",
+        }
+    }
+}
+
 /// Reads the file and prints what follows.
 pub fn run(arguments: &EniArguments) -> Result<Report, Failure> {
+    if let Some(EniCommand::Export(arguments)) = &arguments.command {
+        return export::run(arguments);
+    }
+    let file = arguments.file.as_deref().ok_or_else(|| Failure::new("expected the file of an ENI"))?;
     let EniFile { eni: model, configuration, .. } =
-        EniFile::load(&arguments.file).map_err(|error| Failure::new(error.to_string()))?;
+        EniFile::load(file).map_err(|error| Failure::new(error.to_string()))?;
     summary(&model, &configuration).iter().for_each(|line| say!("{line}"));
     if arguments.details {
         details::lines(&model, &configuration).iter().for_each(|line| say!("{line}"));

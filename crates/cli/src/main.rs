@@ -145,7 +145,7 @@ enum Command {
     ///
     /// Any EtherCAT MainDevice at their other end can work with it.
     Sim(sim::SimArguments),
-    /// Shows what an ENI says and what follows from it
+    /// Shows what an ENI says and what follows from it, or writes one
     ///
     /// An ENI is a network that TwinCAT, EC-Engineer or another tool has configured. No interface is needed.
     Eni(eni_summary::EniArguments),
@@ -214,7 +214,7 @@ impl Command {
             #[cfg(feature = "standby")]
             Command::StandbyGuard(_) => "standby-guard",
             Command::Sim(_) => "sim",
-            Command::Eni(_) => "eni",
+            Command::Eni(arguments) => arguments.name(),
             Command::Esi(arguments) => arguments.name(),
             Command::Sii(arguments) => arguments.name(),
             Command::Bench(arguments) => arguments.name(),

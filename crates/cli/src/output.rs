@@ -16,6 +16,8 @@ use crate::json::line::{AnswerLine, EventLine, Head, Kind, SCHEMA_VERSION};
 static FAILURE: OnceLock<io::Error> = OnceLock::new();
 /// The command, where the standard output is for JSON.
 static JSON: OnceLock<Option<&'static str>> = OnceLock::new();
+/// Set where the standard output is a file that the command makes.
+static FILE: OnceLock<()> = OnceLock::new();
 
 /// Text is suppressed from now on: the standard output is for the JSON of this command. Called once, at the start.
 pub fn switch_to_json(command: Option<&'static str>) {
@@ -33,9 +35,21 @@ pub fn is_terminal() -> bool {
     !is_json() && stdout().is_terminal()
 }
 
-/// Writes text and flushes it, unless the standard output is for JSON. A closed pipe is no error.
+/// Writes a file that the command makes: nothing else is printed on the standard output.
+pub fn write_file(text: &str) {
+    // Only the first call counts.
+    let _ = FILE.set(());
+    put(format_args!("{text}"));
+}
+
+/// Whether the standard output is a file that the command makes.
+pub fn is_file() -> bool {
+    FILE.get().is_some()
+}
+
+/// Writes text and flushes it, unless the standard output is for JSON or for a file. A closed pipe is no error.
 pub fn write(text: Arguments<'_>) {
-    if !is_json() {
+    if !is_json() && !is_file() {
         put(text);
     }
 }

@@ -89,7 +89,7 @@ fn conclude_report(verdict: &Verdict, data: &Data) -> ExitCode {
         eprintln!("result: FAILED: the standard output cannot be written: {error}");
         return ExitCode::from(FAILED);
     }
-    if output::is_json() {
+    if output::is_json() || output::is_file() {
         eprintln!("result: {}", verdict.words());
     }
     ExitCode::from(exit_code)

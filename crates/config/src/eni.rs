@@ -1,5 +1,5 @@
 //! ENI files (ETG.2100; protocol 8): input is the bytes of a file, output an [`Eni`] or an error with line, column and
-//! element.
+//! element, and the text of a file for an [`Eni`].
 //!
 //! The reader is lenient where the files of tools differ (order of elements, `#x` and `0x` numbers, encodings, unknown
 //! elements). It is strict where a wrong guess would result in a wrong network: an invalid number, data with half a
@@ -10,6 +10,7 @@ mod error;
 mod kind;
 mod model;
 mod parse;
+mod write;
 
 pub use crate::xml::Place;
 pub(crate) use crate::xml::shown as quoted;
@@ -22,6 +23,8 @@ pub use model::{
     Poll, Port, PreviousPort, ProcessData, ProcessImage, RawMailCommand, Requires, SoeCommand, SubDevice,
     SyncManagerKind, SyncManagerSettings, Target, Transition, Unknown, Validate, Variable,
 };
+
+pub use write::write;
 
 use crate::xml;
 

@@ -21,6 +21,8 @@ mod subdevice;
 mod sync_managers;
 mod transitions;
 
+pub(crate) use subdevice::states;
+
 use ringcat_engine::main_device::Declaration;
 
 use crate::configuration::{Configuration, SubDeviceFacts};

@@ -12,6 +12,7 @@ pub mod model;
 mod read;
 #[cfg(test)]
 mod schema;
+mod to_eni;
 mod unique;
 mod values;
 mod write;

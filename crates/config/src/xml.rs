@@ -1,4 +1,5 @@
-//! XML files of configuration tools: bytes to text, limits, positions. [`crate::eni`] and [`crate::esi`] read them.
+//! XML files of configuration tools: bytes to text, limits, positions, and elements to text. [`crate::eni`] and
+//! [`crate::esi`] read them.
 
 mod document;
 mod error;
@@ -7,6 +8,7 @@ mod limits;
 mod lines;
 mod quoted;
 mod text;
+mod writer;
 
 pub use error::Place;
 pub use limits::{MAX_ATTRIBUTES, MAX_BYTES, MAX_DEPTH, MAX_NODES, MAX_SUBDEVICES, MAX_UNKNOWN};
@@ -17,3 +19,4 @@ pub(crate) use guard::check;
 pub(crate) use lines::Lines;
 pub(crate) use quoted::shown;
 pub(crate) use text::{decode, decode_utf8_first};
+pub(crate) use writer::{Elements, one_line};

@@ -40,7 +40,7 @@ const RULES: &[CrateRule] = &[
     CrateRule {
         directory: "config",
         internal: Internal::Only(&["ringcat-engine", "ringcat-wire"]),
-        external: External::Only(&["encoding_rs", "roxmltree", "serde", "sha2", "toml"]),
+        external: External::Only(&["encoding_rs", "quick-xml", "roxmltree", "serde", "sha2", "toml"]),
     },
     CrateRule {
         directory: "sim",

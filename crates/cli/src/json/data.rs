@@ -7,7 +7,7 @@ use super::capture::Capture;
 use super::clocks::Clocks;
 use super::demo::Demo;
 use super::doctor::Doctor;
-use super::eni::EniFile;
+use super::eni::{EniExport, EniFile};
 use super::esi::{EsiDeclared, EsiList, EsiShow};
 use super::network::{Compare, Init};
 use super::ring::Ring;
@@ -35,6 +35,7 @@ pub enum Data {
     #[cfg(feature = "standby")]
     Standby(Standby),
     Eni(Box<EniFile>),
+    EniExport(EniExport),
     EsiList(EsiList),
     EsiShow(EsiShow),
     EsiDeclared(EsiDeclared),

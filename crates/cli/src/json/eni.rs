@@ -284,3 +284,31 @@ pub struct Notice {
     /// Indices of the SubDevices concerned
     pub subdevices: Vec<usize>,
 }
+
+/// An ENI that was written.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct EniExport {
+    /// Number of SubDevices
+    pub subdevices: usize,
+    /// Number of variables
+    pub variables: usize,
+    /// Whether cyclic commands are LRW
+    pub lrw: bool,
+    /// Bytes of the file
+    pub bytes: usize,
+    /// Settings that are not in the file
+    pub left_out: Vec<LeftOut>,
+}
+
+/// A setting that is not in the file. The network of the file comes to OP without it.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct LeftOut {
+    /// The SubDevice, from 0; null: the whole network
+    pub subdevice: Option<usize>,
+    /// The setting
+    pub what: String,
+    /// Why it is not there, and what is without it
+    pub reason: String,
+}

@@ -97,6 +97,7 @@ fn all() -> Vec<(&'static str, Vec<Key>)> {
         ("`standby`", keys::<standby::Standby>()),
         ("`sim`", keys::<sim::Sim>()),
         ("`eni`", keys::<eni::EniFile>()),
+        ("`eni export`", keys::<eni::EniExport>()),
         ("`esi list`", keys::<esi::EsiList>()),
         ("`esi show`", keys::<esi::EsiShow>()),
         ("`esi declare`", keys::<esi::EsiDeclared>()),

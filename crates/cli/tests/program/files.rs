@@ -230,3 +230,46 @@ fn a_device_is_shown_and_declared_with_choices_or_refused_by_file_line_and_devic
     assert!(wrong.verdict().contains("acme.xml:1") && wrong.verdict().contains(reason), "{}", wrong.all());
     assert_eq!(place.read("machine.toml"), text, "the file is as it was");
 }
+
+// covers: eni-run
+#[test]
+fn an_eni_is_exported_from_a_network_file_to_a_file_or_to_the_standard_output() {
+    let place = Place::new("eni-export");
+    let (bus, network, out) =
+        (place.write("bus.toml", &segment(2)), place.path("machine.toml"), place.path("machine.xml"));
+    let made = ringcat(&["init", "--sim", &bus, "--out", &network]);
+    assert_eq!(made.code, Some(0), "{}", made.all());
+    let export = ringcat(&["eni", "export", "--network", &network, "--out", &out]);
+    assert_eq!(export.code, Some(0), "{}", export.all());
+    assert!(export.verdict().starts_with("result: ok: 4 SubDevices with "), "{}", export.all());
+    let text = place.read("machine.xml");
+    let printed = ringcat(&["eni", "export", "--network", &network]);
+    assert_eq!((printed.code, printed.out.as_str()), (Some(0), text.as_str()), "the file and nothing else");
+    assert!(printed.verdict().ends_with("in the standard output"), "{}", printed.all());
+    let shown = ringcat(&["eni", &out]);
+    assert!(shown.code == Some(0) && shown.out.contains("digital-input-8 2"), "{}", shown.all());
+    let same = ringcat(&["compare", "--sim", &bus, "--eni", &out]);
+    assert_eq!(same.code, Some(0), "{}", same.all());
+    let again = ringcat(&["eni", "export", "--eni", &out, "--out", "-"]);
+    assert_eq!((again.code, again.out.as_str()), (Some(0), text.as_str()), "an ENI of an ENI is the same");
+    let lrw = ringcat(&["eni", "export", "--network", &network, "--lrw", "always"]);
+    assert!(lrw.code == Some(0) && lrw.out.contains("<Cmd>12</Cmd>"), "{}", lrw.all());
+    let kept = ringcat(&["eni", "export", "--network", &network, "--out", &out, "--lrw", "always"]);
+    assert!(kept.code == Some(2) && kept.verdict().contains("exists: name another file"), "{}", kept.all());
+    assert_eq!(place.read("machine.xml"), text, "it is as it was");
+}
+
+// covers: eni-run
+#[test]
+fn a_network_that_an_eni_cannot_express_is_refused_with_the_reason_and_no_file() {
+    let place = Place::new("eni-refused");
+    let network = "ringcat_network = 1\n[[domain]]\nname = \"cycle\"\nperiod = \"1ms\"\n\
+                   [[subdevice]]\nname = \"Drive\"\ntarget = \"PREOP\"\n";
+    let (network, out) = (place.write("machine.toml", network), place.path("machine.xml"));
+    let refused = ringcat(&["eni", "export", "--network", &network, "--out", &out]);
+    let expected = "SubDevice 0 \"Drive\": target: PREOP: an ENI describes a network in OP";
+    assert!(refused.code == Some(2) && refused.verdict().contains(expected), "{}", refused.all());
+    assert!(!std::path::Path::new(&out).exists());
+    let json = ringcat(&["--json", "eni", "export", "--network", &network]);
+    assert!(json.code == Some(2) && json.verdict().contains("name a file with --out"), "{}", json.all());
+}

@@ -114,6 +114,9 @@ fn a_network_file_and_its_differences_are_printed_with_the_documented_keys() {
     std::fs::write(&other, devices(["coupler", "servo"])).expect("it is writable");
     let init = good(&page, "init", &format!("--sim {segment} --out {file}"));
     assert_eq!((init["subdevices"].as_u64(), init["digest"].as_str().map(str::len)), (Some(2), Some(64)), "{init}");
+    let eni = directory.file("network.xml");
+    let export = good(&page, "eni export", &format!("--network {file} --out {eni}"));
+    assert_eq!((export["subdevices"].as_u64(), export["lrw"].as_bool()), (Some(2), Some(false)), "{export}");
     let same = good(&page, "compare", &format!("--sim {segment} --network {file}"));
     assert_eq!(same["differences"].as_array().map(Vec::len), Some(0), "{same}");
     let output = ringcat(&format!("--json compare --sim {other} --network {file}"));
@@ -156,6 +159,7 @@ fn what_cannot_be_done_is_an_object_too() {
         "init --main no-such --out /tmp/never.toml",
         "compare --main no-such --network FILE.missing",
         "eni FILE.xml",
+        "eni export --network FILE.missing --out /tmp/never.xml",
         "esi list FILE.missing",
         "esi show FILE.missing",
         "esi declare FILE.missing --out /tmp/never.toml",
@@ -176,6 +180,7 @@ fn what_cannot_be_done_is_an_object_too() {
         let output = ringcat(&format!("{} --json", line.replace("FILE", &file.display().to_string())));
         let command = match line.split(' ').collect::<Vec<_>>().as_slice() {
             [group @ ("bench" | "esi" | "sii"), what, ..] => format!("{group} {what}"),
+            ["eni", "export", ..] => "eni export".to_owned(),
             [command, ..] => (*command).to_owned(),
             [] => String::new(),
         };

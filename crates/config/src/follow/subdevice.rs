@@ -163,7 +163,7 @@ fn is_write(command: Command) -> bool {
 }
 
 /// Source and target state of a transition.
-const fn states(transition: Transition) -> (AlState, AlState) {
+pub(crate) const fn states(transition: Transition) -> (AlState, AlState) {
     use AlState::{Boot, Init, Op, PreOp, SafeOp};
     match transition {
         Transition::Ii => (Init, Init),

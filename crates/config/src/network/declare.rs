@@ -316,14 +316,17 @@ fn fill(config: &mut SubDeviceConfig, of: &SubDevice) {
 }
 
 fn assignment(of: &SyncManager) -> PdoAssignment {
-    let mapping = |pdo: &model::Pdo| match &pdo.entries {
+    PdoAssignment::new(of.number, direction(of), of.pdo.iter().map(mapping).collect())
+}
+
+pub(super) fn mapping(pdo: &model::Pdo) -> PdoMapping {
+    match &pdo.entries {
         None => PdoMapping::from_sii(pdo.index),
         Some(entries) => {
             let entries = entries.iter().map(|entry| PdoEntry::new(entry.index, entry.sub, entry.bits));
             PdoMapping::of(pdo.index, entries.collect::<Vec<_>>())
         }
-    };
-    PdoAssignment::new(of.number, direction(of), of.pdo.iter().map(mapping).collect())
+    }
 }
 
 impl From<SyncSignals> for model::Sync {

@@ -1,0 +1,135 @@
+//! `ringcat eni export`: an ENI of a network file, or of another ENI.
+
+use std::fs::{self, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use ringcat::config::{Export, ExportDetails, ExportError, ExportOptions, LrwUse, export};
+use ringcat::eni::EniFile;
+use ringcat::network::LoadedNetwork;
+
+use crate::failure::Failure;
+use crate::json::data::Data;
+use crate::json::eni::{EniExport, LeftOut};
+use crate::output::{self, counted, say, warn};
+use crate::verdict::{Report, Verdict};
+
+/// The name of the standard output.
+const STANDARD_OUTPUT: &str = "-";
+
+/// What a user should know before.
+const ABOUT_EXPORT: &str = "\
+The ENI has every command that a MainDevice sends to bring the network to OP.
+It is read again before it is written: what an ENI cannot express is refused
+with the SubDevice and the reason, or listed as a warning where the network
+comes to OP without it. docs/eni.md has the list.
+
+  ringcat init --main eth1 --out machine.toml
+  ringcat eni export --network machine.toml --out machine.eni.xml
+  ringcat sim --main veth0 --eni machine.eni.xml";
+
+/// Options of `ringcat eni export`.
+#[derive(Args, Debug)]
+#[command(after_long_help = ABOUT_EXPORT)]
+pub struct ExportArguments {
+    /// The network of a network file (see docs/network-file.md)
+    #[arg(long, value_name = "FILE.toml", required_unless_present = "eni", help_heading = "Network")]
+    network: Option<PathBuf>,
+    /// The network of another ENI, as RingCAT follows it
+    #[arg(long, value_name = "FILE", conflicts_with = "network", help_heading = "Network")]
+    eni: Option<PathBuf>,
+    /// Use of LRW in the cyclic commands
+    #[arg(long, value_enum, default_value = "as-declared", help_heading = "Network")]
+    lrw: Lrw,
+    /// File to write; without it, or with -, the standard output
+    #[arg(long, value_name = "FILE.xml", default_value = STANDARD_OUTPUT, help_heading = "Output")]
+    out: PathBuf,
+    /// Replace the file if it exists
+    #[arg(long, help_heading = "Output")]
+    overwrite: bool,
+}
+
+/// Use of LRW.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Lrw {
+    /// Where the network file or the ENI has it
+    AsDeclared,
+    /// For all process data: not for a ring
+    Always,
+    /// For none: LRD and LWR, as a ring needs
+    Never,
+}
+
+impl From<Lrw> for LrwUse {
+    fn from(lrw: Lrw) -> LrwUse {
+        match lrw {
+            Lrw::AsDeclared => LrwUse::AsDeclared,
+            Lrw::Always => LrwUse::Always,
+            Lrw::Never => LrwUse::Never,
+        }
+    }
+}
+
+/// Writes the file.
+pub fn run(arguments: &ExportArguments) -> Result<Report, Failure> {
+    let out = &arguments.out;
+    let is_standard = out == Path::new(STANDARD_OUTPUT);
+    if is_standard && output::is_json() {
+        return Err(Failure::new("with --json the standard output is for JSON: name a file with --out"));
+    }
+    if !is_standard && !arguments.overwrite && fs::symlink_metadata(out).is_ok() {
+        return Err(Failure::new(format!("{} exists: name another file, or add --overwrite", out.display())));
+    }
+    let export = made(arguments)?;
+    export.left_out.iter().for_each(|it| warn(format!("not in the ENI: {it}")));
+    if is_standard {
+        output::write_file(&export.text);
+    } else {
+        write(arguments, &export.text)?;
+    }
+    let declaration = &export.configuration.declaration;
+    let (subdevices, variables) = (declaration.subdevices.len(), export.configuration.image.variables.len());
+    let left_out = export.left_out.len();
+    if left_out > 0 {
+        say!("{} not in the ENI", counted(left_out, "setting", "settings"));
+    }
+    let held = format!(
+        "{} with {} in {}",
+        counted(subdevices, "SubDevice", "SubDevices"),
+        counted(variables, "variable", "variables"),
+        if is_standard { "the standard output".to_owned() } else { out.display().to_string() }
+    );
+    let data = Data::EniExport(EniExport {
+        subdevices,
+        variables,
+        lrw: !declaration.explicit_lrw.is_empty(),
+        bytes: export.text.len(),
+        left_out: export
+            .left_out
+            .iter()
+            .map(|it| LeftOut { subdevice: it.subdevice, what: it.what.clone(), reason: it.reason.clone() })
+            .collect(),
+    });
+    Ok(Report { verdict: Verdict::Held(held), data })
+}
+
+fn made(arguments: &ExportArguments) -> Result<Export, Failure> {
+    let options = ExportOptions::default().with_lrw(arguments.lrw.into());
+    let failed = |path: &Path, error: ExportError| Failure::new(format!("{}: {error}", path.display()));
+    if let Some(path) = &arguments.network {
+        let network = LoadedNetwork::load(path).map_err(|error| Failure::new(error.to_string()))?;
+        return network.file.to_eni(&options).map_err(|error| failed(path, error));
+    }
+    let path = arguments.eni.as_deref().ok_or_else(|| Failure::new("expected --network FILE or --eni FILE"))?;
+    let file = EniFile::load(path).map_err(|error| Failure::new(error.to_string()))?;
+    export(&file.configuration, &ExportDetails::of(&file.eni), &options).map_err(|error| failed(path, error))
+}
+
+fn write(arguments: &ExportArguments, text: &str) -> Result<(), Failure> {
+    let out = &arguments.out;
+    let mut opening = OpenOptions::new();
+    let opening = opening.write(true).truncate(true).create(true).create_new(!arguments.overwrite);
+    let written = opening.open(out).and_then(|mut file| file.write_all(text.as_bytes()));
+    written.map_err(|error| Failure::new(format!("{} cannot be written: {error}", out.display())))
+}

@@ -1,0 +1,77 @@
+//! What an ENI cannot express.
+
+use std::fmt;
+
+use crate::configuration::Configuration;
+
+/// Why a network cannot be written as an ENI.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct ExportError {
+    /// The SubDevice: its index and its name; `None`: the whole network.
+    pub subdevice: Option<(usize, String)>,
+    /// The setting.
+    pub what: String,
+    /// The reason.
+    pub reason: String,
+}
+
+impl ExportError {
+    /// About the whole network.
+    pub(crate) fn whole(what: impl Into<String>, reason: impl Into<String>) -> ExportError {
+        ExportError { subdevice: None, what: what.into(), reason: reason.into() }
+    }
+
+    /// About a SubDevice.
+    pub(crate) fn of(
+        configuration: &Configuration,
+        index: usize,
+        what: impl Into<String>,
+        reason: impl Into<String>,
+    ) -> ExportError {
+        let name = configuration.subdevices.get(index).map(|facts| facts.name.clone()).unwrap_or_default();
+        ExportError { subdevice: Some((index, name)), what: what.into(), reason: reason.into() }
+    }
+}
+
+impl fmt::Display for ExportError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some((index, name)) = &self.subdevice {
+            write!(f, "SubDevice {index} {}: ", crate::xml::shown(name))?;
+        }
+        write!(f, "{}: {}", self.what, self.reason)
+    }
+}
+
+impl std::error::Error for ExportError {}
+
+/// A setting that the file does not hold. The network of the file comes to OP without it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct LeftOut {
+    /// The index of the SubDevice; `None`: the whole network.
+    pub subdevice: Option<usize>,
+    /// The setting.
+    pub what: String,
+    /// What is without it.
+    pub reason: String,
+}
+
+impl LeftOut {
+    pub(crate) fn new(
+        subdevice: impl Into<Option<usize>>,
+        what: impl Into<String>,
+        reason: impl Into<String>,
+    ) -> LeftOut {
+        LeftOut { subdevice: subdevice.into(), what: what.into(), reason: reason.into() }
+    }
+}
+
+impl fmt::Display for LeftOut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(index) = self.subdevice {
+            write!(f, "SubDevice {index}: ")?;
+        }
+        write!(f, "{}: {}", self.what, self.reason)
+    }
+}

@@ -1,0 +1,107 @@
+//! A configuration with everything that its ENI states and that the engine otherwise decides: station addresses, time
+//! limits of state changes. The reader gives this configuration back.
+
+use std::collections::HashSet;
+
+use ringcat_engine::config::{StateTimeout, SubDeviceConfig};
+use ringcat_engine::info::Direction;
+use ringcat_wire::al::AlState;
+
+use super::error::LeftOut;
+use super::layout::overlaps_in_lrw;
+use super::lrw::Lrw;
+use crate::configuration::Configuration;
+use crate::xml::one_line;
+
+/// The first station address.
+const FIRST_STATION: u16 = 1001;
+/// State changes with a limit in every file.
+pub(super) const UP: [(AlState, AlState); 3] =
+    [(AlState::Init, AlState::PreOp), (AlState::PreOp, AlState::SafeOp), (AlState::SafeOp, AlState::Op)];
+/// State changes with a limit where it is not the usual one.
+pub(super) const OTHERS: [(AlState, AlState); 8] = [
+    (AlState::Init, AlState::Boot),
+    (AlState::Boot, AlState::Init),
+    (AlState::PreOp, AlState::Init),
+    (AlState::SafeOp, AlState::Init),
+    (AlState::Op, AlState::Init),
+    (AlState::Op, AlState::SafeOp),
+    (AlState::SafeOp, AlState::PreOp),
+    (AlState::Op, AlState::PreOp),
+];
+
+pub(super) fn explicit(configuration: &Configuration, lrw: &Lrw, left_out: &mut Vec<LeftOut>) -> Configuration {
+    let mut whole = configuration.clone();
+    for config in &mut whole.declaration.subdevices {
+        limits(config);
+        signals(config);
+        for command in &mut config.startup {
+            command.comment = command.comment.take().map(|text| one_line(&text)).filter(|text| !text.is_empty());
+        }
+    }
+    stations(&mut whole);
+    for facts in &mut whole.subdevices {
+        facts.name = one_line(&facts.name);
+    }
+    whole.groups.iter_mut().for_each(|name| *name = one_line(name));
+    for variable in &mut whole.image.variables {
+        variable.name = one_line(&variable.name);
+        variable.data_type = one_line(&variable.data_type);
+    }
+    // The inputs come first in a file.
+    whole.image.variables.sort_by_key(|variable| variable.direction == Direction::Outputs);
+    if overlaps_in_lrw(&whole, lrw) {
+        move_inputs(&mut whole, left_out);
+    }
+    whole
+}
+
+/// An LRW has the outputs before the inputs, so the inputs of the image begin behind the outputs.
+fn move_inputs(whole: &mut Configuration, left_out: &mut Vec<LeftOut>) {
+    let bytes = whole.image.outputs_len;
+    let bits = u32::try_from(bytes * 8).unwrap_or(u32::MAX);
+    whole.image.inputs_len += bytes;
+    let areas = whole.image.areas.iter_mut().filter(|area| area.direction == Direction::Inputs);
+    areas.for_each(|area| area.image_bit = area.image_bit.saturating_add(bits));
+    let variables = whole.image.variables.iter_mut().filter(|it| it.direction == Direction::Inputs);
+    variables.for_each(|variable| variable.image_bit = variable.image_bit.saturating_add(bits));
+    let reason = format!("an LRW has the outputs before the inputs: the inputs begin at byte {bytes} of their image");
+    left_out.push(LeftOut::new(None, "place of the inputs", reason));
+}
+
+/// Time limits that an ENI states at the check of AL status.
+fn limits(config: &mut SubDeviceConfig) {
+    if config.declared.is_none() {
+        return;
+    }
+    let usual = SubDeviceConfig::default();
+    for (from, to) in UP.into_iter().chain(OTHERS) {
+        let limit = config.limit(from, to);
+        let is_stated = config.state_timeouts.iter().any(|it| (it.from, it.to) == (from, to));
+        if !is_stated && (UP.contains(&(from, to)) || limit != usual.limit(from, to)) {
+            config.state_timeouts.push(StateTimeout::new(from, to, limit));
+        }
+    }
+}
+
+/// A SYNC1 with the cycle of SYNC0 has no cycle of its own in the registers (protocol 7.3).
+fn signals(config: &mut SubDeviceConfig) {
+    if let Some(sync) = config.sync.as_mut().filter(|sync| sync.sync1_cycle_ns == sync.sync0_cycle_ns) {
+        sync.sync1_cycle_ns = 0;
+    }
+}
+
+/// A station address for each SubDevice without one.
+fn stations(whole: &mut Configuration) {
+    let mut used: HashSet<u16> = whole.subdevices.iter().filter_map(|facts| facts.station).collect();
+    let mut next = FIRST_STATION;
+    for facts in &mut whole.subdevices {
+        if facts.station.is_some_and(|station| station != 0) {
+            continue;
+        }
+        while !used.insert(next) {
+            next = next.wrapping_add(1);
+        }
+        facts.station = Some(next);
+    }
+}

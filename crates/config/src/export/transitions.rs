@@ -1,0 +1,16 @@
+//! Transitions of start-up commands.
+
+use ringcat_engine::config::Transition as EngineTransition;
+
+use crate::eni::Transition;
+
+/// The transition of a file.
+pub(super) const fn transition(of: EngineTransition) -> Transition {
+    match of {
+        EngineTransition::Ip => Transition::Ip,
+        EngineTransition::Ps => Transition::Ps,
+        EngineTransition::So => Transition::So,
+        EngineTransition::Os => Transition::Os,
+        EngineTransition::Sp => Transition::Sp,
+    }
+}

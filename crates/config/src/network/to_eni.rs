@@ -1,0 +1,267 @@
+//! From a network file to an ENI. What the engine takes from the EEPROM at a start is stated: SyncManagers and
+//! mailboxes as the file notes them for exports, the commands that assign and map PDOs, the reference clock.
+
+mod pdos;
+
+use std::collections::BTreeSet;
+
+use ringcat_engine::config::{DeclaredSyncManager, ReferenceClock, SyncManagerRole};
+use ringcat_engine::declared::SubDeviceId;
+use ringcat_engine::info::Direction;
+use ringcat_engine::main_device::{Declaration, DomainMember};
+use ringcat_wire::register::{SyncManager as Register, SyncManagerActivate, SyncManagerControl};
+
+use super::model::{self, Buffer, Lrw, NetworkFile, SubDevice, SyncManager};
+use crate::configuration::{Configuration, ImageArea};
+use crate::eni;
+use crate::export::{Export, ExportDetails, ExportError, ExportOptions, LeftOut, SubDeviceDetails, export};
+
+/// Control bytes of mailboxes (protocol 3.11).
+const MAILBOX_OUT: u8 = 0x26;
+const MAILBOX_IN: u8 = 0x22;
+/// Watchdog enable in the control byte.
+const WATCHDOG: u8 = 0x40;
+
+impl NetworkFile {
+    /// The ENI of the network.
+    ///
+    /// # Errors
+    /// [`ExportError`]: what an ENI cannot express, or what it has to state and the file leaves to the EEPROM.
+    pub fn to_eni(&self, options: &ExportOptions) -> Result<Export, ExportError> {
+        let mut configuration = self.configuration();
+        let mut left_out = of_file(self);
+        for (index, of) in self.subdevice.iter().enumerate() {
+            let declared = declared(&configuration, index, of)?;
+            let config = &mut configuration.declaration.subdevices[index];
+            pdos::prepend(&mut config.startup, of);
+            config.sync_managers.clear();
+            config.pdos = None;
+            config.declared_bootstrap = bootstrap(of);
+            if declared.is_empty() && !is_scanned(of) {
+                let reason = "the file leaves its process data to the EEPROM: the ENI has none";
+                left_out.push(LeftOut::new(index, "sync_manager", reason));
+            }
+            config.declared = Some(declared);
+        }
+        places(&mut configuration);
+        let names = domains(self, &mut configuration.declaration, &mut left_out);
+        reference(&mut configuration, &mut left_out)?;
+        let mut export = export(&configuration, &self.details(names), options)?;
+        left_out.append(&mut export.left_out);
+        export.left_out = left_out;
+        Ok(export)
+    }
+
+    /// What is for people and for other MainDevices.
+    fn details(&self, tasks: Vec<String>) -> ExportDetails {
+        let of = |it: &SubDevice| SubDeviceDetails {
+            vendor_id: it.vendor,
+            product_code: it.product,
+            revision: it.revision,
+            serial: it.serial,
+            physics: it.ports.clone(),
+            protocols: it.mailbox.iter().flat_map(|it| &it.protocols).map(|it| format!("{it:?}")).collect(),
+            pdos: it.sync_manager.iter().flat_map(|sm| sm.pdo.iter().map(|pdo| named(sm, pdo))).collect(),
+        };
+        let subdevices = self.subdevice.iter().map(of).collect();
+        ExportDetails { name: self.name.clone(), subdevices, tasks }
+    }
+}
+
+/// A SubDevice of a scan has its mailbox or the kinds of its ports in the file, so it has no more process data.
+fn is_scanned(of: &SubDevice) -> bool {
+    !of.ports.is_empty() || of.mailbox.is_some()
+}
+
+/// What only network files have.
+fn of_file(file: &NetworkFile) -> Vec<LeftOut> {
+    let mut left_out = Vec::new();
+    if file.redundancy != model::Redundancy::default() {
+        let reason = "an ENI does not name rings: the MainDevice is told by its own options";
+        left_out.push(LeftOut::new(None, "redundancy", reason));
+    }
+    if file.lrw == Lrw::Always && file.redundancy.ring {
+        left_out.push(LeftOut::new(None, "lrw", "a ring refuses the LRW commands of this file"));
+    }
+    for (index, of) in file.subdevice.iter().enumerate() {
+        if !of.firmware.is_empty() {
+            left_out.push(LeftOut::new(index, "firmware", "an ENI has no version of the firmware"));
+        }
+        if !of.order_code.is_empty() && of.order_code != of.name {
+            left_out.push(LeftOut::new(index, "order_code", "an ENI has the name alone"));
+        }
+    }
+    left_out
+}
+
+/// The SyncManagers, with the mailboxes.
+fn declared(
+    configuration: &Configuration,
+    index: usize,
+    of: &SubDevice,
+) -> Result<Vec<DeclaredSyncManager>, ExportError> {
+    let mut found = Vec::new();
+    if let Some(mailbox) = &of.mailbox {
+        found.push(buffer(0, SyncManagerRole::MailboxOut, mailbox.write, MAILBOX_OUT));
+        found.push(buffer(1, SyncManagerRole::MailboxIn, mailbox.read, MAILBOX_IN));
+    }
+    for it in &of.sync_manager {
+        let refused = |reason: &str| {
+            ExportError::of(configuration, index, format!("SyncManager {}", it.number), reason.to_owned())
+        };
+        if found.iter().any(|other| other.index == it.number) {
+            return Err(refused("a mailbox uses it"));
+        }
+        let Some(length) = length(it).ok_or_else(|| {
+            refused("the entries of its PDOs are those of the EEPROM: an ENI has to state them (`ringcat init` does)")
+        })?
+        else {
+            continue;
+        };
+        let (Some(start), Some(control)) = (it.start, it.control) else {
+            return Err(refused("an ENI needs its `start` and `control` (`ringcat init` writes them)"));
+        };
+        let control = match it.watchdog {
+            None => control,
+            Some(true) => control | WATCHDOG,
+            Some(false) => control & !WATCHDOG,
+        };
+        let role = match it.direction {
+            model::Direction::Outputs => SyncManagerRole::Outputs,
+            model::Direction::Inputs => SyncManagerRole::Inputs,
+        };
+        let pdos = it.pdo.iter().map(super::declare::mapping).collect();
+        let one = buffer(it.number, role, Buffer { start, length }, control);
+        found.push(one.with_op_only(it.op_only).with_pdos(pdos));
+    }
+    found.sort_by_key(|it| it.index);
+    Ok(found)
+}
+
+/// Bytes of a SyncManager: `Some(None)` if it is disabled, `None` if they are not known.
+fn length(of: &SyncManager) -> Option<Option<u16>> {
+    let mut bits = 0_u32;
+    for pdo in &of.pdo {
+        bits += pdo.entries.as_ref()?.iter().map(|entry| u32::from(entry.bits)).sum::<u32>();
+    }
+    let of_pdos = u16::try_from(bits.div_ceil(8)).unwrap_or(u16::MAX);
+    let length = of.length.unwrap_or(of_pdos);
+    Some((length > 0).then_some(length))
+}
+
+fn buffer(index: u8, role: SyncManagerRole, of: Buffer, control: u8) -> DeclaredSyncManager {
+    let register = Register {
+        start: of.start,
+        length: of.length,
+        control: SyncManagerControl::from_bits(control),
+        activate: SyncManagerActivate { enable: true, ..SyncManagerActivate::default() },
+        ..Register::default()
+    };
+    DeclaredSyncManager::new(index, role, register)
+}
+
+fn bootstrap(of: &SubDevice) -> Option<[DeclaredSyncManager; 2]> {
+    let mailbox = of.mailbox.as_ref()?;
+    let (write, read) = mailbox.boot_write.zip(mailbox.boot_read)?;
+    let out = buffer(0, SyncManagerRole::MailboxOut, write, MAILBOX_OUT);
+    Some([out, buffer(1, SyncManagerRole::MailboxIn, read, MAILBOX_IN)])
+}
+
+/// Process data without PDOs has no variables, so the image of a network file does not have it; the commands of an ENI
+/// need a place for it: behind all other.
+fn places(configuration: &mut Configuration) {
+    let Configuration { declaration, image, .. } = configuration;
+    for (subdevice, config) in declaration.subdevices.iter().enumerate() {
+        for area in config.declared.iter().flatten().filter_map(DeclaredSyncManager::area) {
+            let number = Some(area.sync_manager);
+            if image.areas.iter().any(|it| it.subdevice == subdevice && it.sync_manager == number) {
+                continue;
+            }
+            let (direction, bits) = (area.direction, u32::from(area.length) * 8);
+            let length = match direction {
+                Direction::Outputs => &mut image.outputs_len,
+                Direction::Inputs => &mut image.inputs_len,
+            };
+            let image_bit = u32::try_from(*length * 8).unwrap_or(u32::MAX);
+            *length += usize::from(area.length);
+            image.areas.push(ImageArea { subdevice, direction, sync_manager: number, bit_offset: 0, image_bit, bits });
+        }
+    }
+    image.areas.sort_by_key(|area| (area.direction == Direction::Inputs, area.image_bit));
+}
+
+/// Domains as an ENI has them: members are the SyncManagers with process data. Returns the names of those that are
+/// left.
+fn domains(file: &NetworkFile, declaration: &mut Declaration, left_out: &mut Vec<LeftOut>) -> Vec<String> {
+    let of = |at: usize| -> BTreeSet<u8> {
+        let declared = declaration.subdevices[at].declared.iter().flatten();
+        declared.filter_map(DeclaredSyncManager::area).map(|area| area.sync_manager).collect()
+    };
+    let mut names = Vec::new();
+    let mut kept = Vec::new();
+    for (mut domain, named) in declaration.domains.iter().cloned().zip(&file.domain) {
+        let own = |member: &DomainMember| {
+            let SubDeviceId(at) = member.subdevice;
+            let all = of(at);
+            let here: Vec<u8> = match &member.sync_managers {
+                None => return (!all.is_empty()).then(|| DomainMember::new(member.subdevice)),
+                Some(numbers) => all.iter().copied().filter(|number| numbers.contains(number)).collect(),
+            };
+            let is_whole = here.len() == all.len();
+            let member = DomainMember::new(member.subdevice);
+            (!here.is_empty()).then(|| member.with_sync_managers((!is_whole).then_some(here)))
+        };
+        domain.members = domain.members.iter().filter_map(own).collect();
+        if domain.members.is_empty() {
+            let what = format!("domain {:?}", named.name);
+            left_out.push(LeftOut::new(None, what, "no SubDevice has process data in it"));
+        } else {
+            names.push(named.name.clone());
+            kept.push(domain);
+        }
+    }
+    declaration.domains = kept;
+    names
+}
+
+/// An ENI names the reference clock. Without a name the engine takes the first SubDevice with a clock, which the file
+/// does not know: it is the first one with SYNC signals.
+fn reference(configuration: &mut Configuration, left_out: &mut Vec<LeftOut>) -> Result<(), ExportError> {
+    let configs = &configuration.declaration.subdevices;
+    let first = configs.iter().position(|config| config.sync.is_some());
+    let Some(clocks) = &mut configuration.declaration.clocks else {
+        let Some(index) = first else { return Ok(()) };
+        let reason = "they need the distributed clocks: add a table `[clocks]`";
+        return Err(ExportError::of(configuration, index, "SYNC signals", reason));
+    };
+    if matches!(clocks.reference, ReferenceClock::Declared(_)) {
+        return Ok(());
+    }
+    let Some(index) = first else {
+        let reason = "an ENI names the SubDevice with the reference clock: add `reference` to the table `[clocks]`";
+        return Err(ExportError::whole("clocks", reason));
+    };
+    clocks.reference = ReferenceClock::Declared(SubDeviceId(index));
+    let reason = "the file names no reference clock: in the ENI it is this SubDevice, the first with SYNC signals";
+    left_out.push(LeftOut::new(index, "clocks", reason));
+    Ok(())
+}
+
+/// A PDO with its names.
+fn named(sync_manager: &SyncManager, pdo: &model::Pdo) -> eni::Pdo {
+    let entry = |it: &model::Entry| eni::PdoEntry {
+        index: it.index,
+        sub_index: it.sub,
+        bit_length: it.bits.into(),
+        name: it.name.clone(),
+        data_type: it.data_type.clone(),
+    };
+    eni::Pdo {
+        place: eni::Place::default(),
+        outputs: sync_manager.direction == model::Direction::Outputs,
+        index: pdo.index,
+        name: pdo.name.clone(),
+        sync_manager: Some(sync_manager.number),
+        entries: pdo.entries.iter().flatten().map(entry).collect(),
+    }
+}

@@ -1,0 +1,170 @@
+//! ENIs from network files.
+
+use ringcat_config::{ExportOptions, LrwUse};
+use ringcat_engine::config::{ConfigAddress, ReferenceClock, StartupAction, SyncManagerRole, Transition};
+use ringcat_engine::declared::{GroupId, SubDeviceId};
+use ringcat_engine::info::Direction;
+use ringcat_wire::al::AlState;
+
+use crate::{CELL, model, network};
+
+// covers: eni-run
+#[test]
+fn the_eni_of_a_network_file_declares_the_network_of_the_file() {
+    let file = network(CELL);
+    let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let (before, after) = (file.configuration(), export.configuration);
+    for (index, (of, got)) in before.declaration.subdevices.iter().zip(&after.declaration.subdevices).enumerate() {
+        let place = (of.address, of.expected, of.group, of.optional, of.sync);
+        assert_eq!((got.address, got.expected, got.group, got.optional, got.sync), place);
+        let registers = (of.watchdog_divider, of.watchdog_intervals, of.pdi_watchdog_intervals, of.sii_to_pdi);
+        assert_eq!(
+            (got.watchdog_divider, got.watchdog_intervals, got.pdi_watchdog_intervals, got.sii_to_pdi),
+            registers
+        );
+        for transition in [Transition::Ip, Transition::Ps, Transition::So, Transition::Os, Transition::Sp] {
+            let own = of.startup.iter().filter(|command| command.transition == transition);
+            let all: Vec<_> = got.startup.iter().filter(|command| command.transition == transition).collect();
+            let own: Vec<_> = own.collect();
+            assert!(all.ends_with(&own), "{index}, {transition}: {all:?}");
+        }
+        let limits = |from, to| (of.limit(from, to), got.limit(from, to));
+        for (from, to) in [(AlState::Init, AlState::PreOp), (AlState::Op, AlState::Init)] {
+            let (expected, got) = limits(from, to);
+            assert_eq!(expected, got);
+        }
+        let pdos = of.pdos.iter().flatten().map(|it| (it.sync_manager, it.pdos.clone()));
+        let declared = got.declared.iter().flatten().filter(|it| !it.pdos.is_empty());
+        assert_eq!(
+            declared.map(|it| (it.index, it.pdos.clone())).collect::<Vec<_>>(),
+            pdos.filter(|(_, pdos)| !pdos.is_empty()).collect::<Vec<_>>()
+        );
+    }
+    assert_eq!(after.groups, ["tool 1", "camera"]);
+    let names = |of: &ringcat_config::Configuration| {
+        let mut names: Vec<String> = of.image.variables.iter().map(|variable| variable.name.clone()).collect();
+        names.sort();
+        names
+    };
+    assert_eq!(names(&after), names(&before));
+    assert_eq!(after.subdevices[1].plugged_into, before.subdevices[1].plugged_into);
+    let clocks = after.declaration.clocks.as_ref().expect("the file has clocks");
+    assert_eq!((clocks.reference, clocks.bus_shift), (ReferenceClock::Declared(SubDeviceId(1)), true));
+}
+
+// covers: eni-run
+#[test]
+fn sync_managers_mailboxes_and_domains_of_a_network_file_are_in_its_eni() {
+    let export = network(CELL).to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let configs = &export.configuration.declaration.subdevices;
+    let shape = |index: usize| {
+        let declared = configs[index].declared.iter().flatten();
+        declared.map(|it| (it.index, it.role, it.register.start, it.register.length, it.op_only)).collect::<Vec<_>>()
+    };
+    use SyncManagerRole::{Inputs, MailboxIn, MailboxOut, Outputs};
+    assert_eq!(shape(0), []);
+    let drive = [
+        (0, MailboxOut, 0x1000, 128, false),
+        (1, MailboxIn, 0x1080, 128, false),
+        (2, Outputs, 0x1200, 7, false),
+        (3, Inputs, 0x1300, 2, false),
+    ];
+    assert_eq!(shape(1), drive);
+    assert_eq!(shape(2), [(0, Outputs, 0x0F00, 2, true)], "it is enabled in OP only");
+    assert_eq!(configs[2].address, ConfigAddress::Alias { alias: 5, offset: 0 });
+    assert_eq!(configs[4].address, ConfigAddress::Identification { value: 9, offset: 0 });
+    assert_eq!((configs[3].group, configs[4].group), (Some(GroupId(0)), Some(GroupId(1))));
+    let declared = configs[1].declared.as_ref().expect("SyncManagers");
+    assert_eq!(declared[2].register.control.bits(), 0x64, "with the watchdog");
+    let boot = configs[1].declared_bootstrap.as_ref().expect("mailboxes of BOOT");
+    assert_eq!((boot[0].register.length, boot[1].register.start), (256, 0x1100));
+    let domains: Vec<_> = export
+        .configuration
+        .declaration
+        .domains
+        .iter()
+        .map(|domain| {
+            let members = domain.members.iter().map(|it| (it.subdevice.0, it.sync_managers.clone()));
+            (domain.period.as_millis(), members.collect::<Vec<_>>())
+        })
+        .collect();
+    let fast = vec![(1, Some(vec![2])), (2, None)];
+    assert_eq!(domains, [(1, fast), (10, vec![(1, Some(vec![3])), (3, None)])]);
+    let assigned = configs[1].startup.iter().filter_map(|command| match &command.action {
+        StartupAction::Sdo(download) if download.index >= 0x1C12 && download.index < 0x1C20 => {
+            Some(download.data.clone())
+        }
+        _ => None,
+    });
+    let expected: [Vec<u8>; 6] = [vec![0], vec![0x00, 0x16], vec![1], vec![0], vec![0x00, 0x1A], vec![1]];
+    assert_eq!(assigned.collect::<Vec<_>>(), expected);
+    let eni = model(&export.text);
+    assert_eq!(eni.main_device.name, "Cell & <4>");
+    let drive = &eni.subdevices[1];
+    assert_eq!((drive.physics.as_str(), drive.revision, drive.serial), ("YY", Some(0x10_0000), Some(77)));
+    assert_eq!(drive.mailbox.as_ref().unwrap().protocols, ["EoE", "CoE", "FoE", "SoE"]);
+    let pdo = &drive.process_data.as_ref().unwrap().pdos[0];
+    assert_eq!((pdo.name.as_str(), pdo.entries[1].name.as_str()), ("Command", "Target > \"0\""));
+}
+
+// covers: eni-run
+#[test]
+fn each_domain_of_a_network_file_has_an_lrw_of_its_own() {
+    let export = network(CELL)
+        .to_eni(&ExportOptions::default().with_lrw(LrwUse::Always))
+        .unwrap_or_else(|error| panic!("{error}"));
+    assert!(export.left_out.iter().all(|it| it.what != "place of the inputs"), "{:?}", export.left_out);
+    let lrw = &export.configuration.declaration.explicit_lrw;
+    let subdevices: Vec<Vec<usize>> = lrw.iter().map(|it| it.subdevices.iter().map(|it| it.0).collect()).collect();
+    assert_eq!(subdevices, [vec![1, 2], vec![1, 3]]);
+}
+
+/// The inputs of the drive would replace the outputs for the tool behind it.
+// covers: eni-run
+#[test]
+fn inputs_that_would_replace_outputs_in_an_lrw_are_behind_the_outputs() {
+    let mut file = network(CELL);
+    file.subdevice[1].sync_manager.remove(0);
+    file.subdevice[1].sync_manager[0].domain = None;
+    let export =
+        file.to_eni(&ExportOptions::default().with_lrw(LrwUse::Always)).unwrap_or_else(|error| panic!("{error}"));
+    let image = &export.configuration.image;
+    let inputs = image.areas.iter().filter(|area| area.direction == Direction::Inputs);
+    assert_eq!(inputs.map(|area| area.image_bit).min(), Some(image.outputs_len as u32 * 8));
+    assert!(export.left_out.iter().any(|it| it.what == "place of the inputs"), "{:?}", export.left_out);
+    let apart = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(apart.configuration.image.inputs_len + image.outputs_len, image.inputs_len);
+}
+
+// covers: eni-run
+#[test]
+fn names_of_any_characters_give_a_well_formed_file() {
+    let file = network(CELL);
+    let every: Vec<char> = (0..=0xFFFF_u32).filter_map(char::from_u32).chain(['\u{1F600}', '\u{10FFFF}']).collect();
+    for chunk in every.chunks(4096) {
+        let mut file = file.clone();
+        let text: String = format!("]]>{}--&lt;<a b='\"", chunk.iter().collect::<String>());
+        file.name.clone_from(&text);
+        file.domain[0].name.clone_from(&text);
+        file.subdevice[1].sync_manager[0].pdo[0].name.clone_from(&text);
+        file.subdevice[1].startup[0].comment = Some(text.clone());
+        file.subdevice[3].name.clone_from(&text);
+        for it in &mut file.subdevice {
+            if let Some(group) = &mut it.group {
+                group.push_str(&text);
+            }
+        }
+        let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        let read = model(&export.text);
+        let expected: String = text
+            .chars()
+            .map(|it| match it {
+                '\u{FFFE}' | '\u{FFFF}' => '\u{FFFD}',
+                it if it.is_control() => ' ',
+                it => it,
+            })
+            .collect();
+        assert_eq!(read.main_device.name, expected.trim());
+        assert_eq!(export.configuration.subdevices[3].name, expected.trim());
+    }
+}

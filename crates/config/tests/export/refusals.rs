@@ -1,0 +1,88 @@
+//! What an ENI cannot express: refused with SubDevice, setting and reason, or listed.
+
+use ringcat_config::network::model::{CheckRevision, Target};
+use ringcat_config::network::{NetworkFile, Time};
+use ringcat_config::{Configuration, ExportDetails, ExportOptions, export};
+use ringcat_engine::config::{RegisterAccess, RegisterCommand, StartupAction, StartupCommand, Transition};
+use ringcat_wire::address::RegisterAddress;
+
+use crate::{CELL, SMALL, configured, network};
+
+const COUPLER: usize = 0;
+const DRIVE: usize = 1;
+
+/// The error of the network file after a change.
+fn refusal(change: impl FnOnce(&mut NetworkFile)) -> String {
+    let mut file = network(CELL);
+    change(&mut file);
+    file.to_eni(&ExportOptions::default()).expect_err("an ENI cannot express it").to_string()
+}
+
+// covers: eni-run
+#[test]
+fn settings_without_which_another_network_results_are_refused_by_name() {
+    let of_drive =
+        |change: fn(&mut ringcat_config::network::model::SubDevice)| refusal(|file| change(&mut file.subdevice[DRIVE]));
+    let expect = |got: String, expected: &str| assert!(got.starts_with(expected), "{got}");
+    let drive = "SubDevice 1 \"Drive\": ";
+    expect(of_drive(|it| it.target = Target::Preop), &format!("{drive}target: PREOP"));
+    expect(
+        of_drive(|it| it.check_revision = CheckRevision::EqualOrGreater),
+        &format!("{drive}comparison of the revision"),
+    );
+    expect(of_drive(|it| it.check_revision = CheckRevision::LowEqual), &format!("{drive}comparison of the revision"));
+    expect(of_drive(|it| it.check_identification = Some(3)), &format!("{drive}identification"));
+    expect(of_drive(|it| it.alias = Some(7)), &format!("{drive}place: an alias"));
+    expect(of_drive(|it| it.sync_manager[0].start = None), &format!("{drive}SyncManager 2: an ENI needs its `start`"));
+    expect(
+        of_drive(|it| it.sync_manager[0].pdo[0].entries = None),
+        &format!("{drive}SyncManager 2: the entries of its PDOs"),
+    );
+    expect(
+        of_drive(|it| it.startup[0].limit = Some(Time(std::time::Duration::from_micros(1_500)))),
+        &format!("{drive}time limit"),
+    );
+    expect(refusal(|file| file.domain[0].period = Time(std::time::Duration::from_nanos(1_500))), "domain: 1.5µs");
+    expect(refusal(|file| file.clocks = None), &format!("{drive}SYNC signals"));
+}
+
+// covers: eni-run
+#[test]
+fn commands_that_the_maindevice_sends_itself_are_refused_as_start_up_commands() {
+    let mut configuration = configured(SMALL);
+    let write = RegisterAccess::Write(vec![1, 0]);
+    let action = StartupAction::Register(RegisterCommand::new(RegisterAddress(0x0120), write));
+    configuration.declaration.subdevices[COUPLER].startup.push(StartupCommand::new(Transition::Ps, action));
+    let error = export(&configuration, &ExportDetails::default(), &ExportOptions::default()).expect_err("not sent");
+    assert!(error.to_string().contains("start-up commands") || error.what == "the written file", "{error}");
+}
+
+// covers: eni-run
+#[test]
+fn a_network_without_subdevices_is_refused() {
+    let error = export(&Configuration::default(), &ExportDetails::default(), &ExportOptions::default());
+    assert_eq!(error.expect_err("nothing is there").to_string(), "network: it has no SubDevice");
+}
+
+// covers: eni-run
+#[test]
+fn settings_that_an_eni_has_no_place_for_are_listed() {
+    let mut file = network(CELL);
+    file.subdevice[COUPLER].optional = true;
+    file.subdevice[DRIVE].firmware = "1.0".to_owned();
+    file.subdevice[DRIVE].timeouts.sdo = Some(Time(std::time::Duration::from_secs(9)));
+    file.domain[1].send_again = true;
+    file.redundancy.ring = true;
+    let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let listed: Vec<_> = export.left_out.iter().map(|it| (it.subdevice, it.what.as_str())).collect();
+    let expected = [
+        (None, "redundancy"),
+        (Some(DRIVE), "firmware"),
+        (None, "domain/send_again"),
+        (Some(COUPLER), "optional"),
+        (Some(DRIVE), "timeouts"),
+    ];
+    assert_eq!(listed, [&expected[..2], &[(Some(4), "sync_manager")], &expected[2..]].concat());
+    let plain = network(CELL).to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(plain.left_out.len(), 1, "{:?}", plain.left_out);
+}

@@ -1,0 +1,148 @@
+//! ENI, declaration, ENI, declaration: the same.
+
+use std::fs;
+use std::path::Path;
+
+use ringcat_config::{Configuration, ExportOptions, LrwUse, eni, follow};
+use ringcat_engine::config::SubDeviceConfig;
+use ringcat_wire::al::AlState;
+
+use crate::{SMALL, again, configured, model};
+
+/// A RingCAT example: packed outputs, a copy, a drive with its own mapping and SYNC0, one LRW for all.
+const MACHINE: &str = include_str!("../../../ringcat/examples/machine.eni.xml");
+
+const STATES: [AlState; 5] = [AlState::Init, AlState::PreOp, AlState::Boot, AlState::SafeOp, AlState::Op];
+
+/// The example, the test file, and the real files, if they are there.
+fn files() -> Vec<(String, String)> {
+    let mut files = vec![("small".to_owned(), SMALL.to_owned()), ("machine".to_owned(), MACHINE.to_owned())];
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/eni");
+    let Ok(entries) = fs::read_dir(&path) else {
+        println!("skipped: {} is not there", path.display());
+        return files;
+    };
+    for entry in entries.map(|entry| entry.unwrap().path()) {
+        let name = entry.file_name().unwrap().to_string_lossy().into_owned();
+        if !name.starts_with("beremiz") {
+            let bytes = fs::read(&entry).unwrap();
+            files.push((name, bytes.iter().map(|byte| char::from(*byte)).collect()));
+        }
+    }
+    files
+}
+
+/// A model without its places, unknown elements and schema.
+fn bare(text: &str) -> String {
+    let mut eni = model(text);
+    (eni.unknown, eni.more_unknown, eni.version) = (Vec::new(), 0, None);
+    let shown = format!("{eni:?}");
+    let mut parts = shown.split("Place { line: ");
+    let first = parts.next().unwrap().to_owned();
+    parts.fold(first, |all, part| all + part.split_once(" }").expect("a column").1)
+}
+
+/// What the file states of a SubDevice, in an order that does not depend on the file.
+fn settings(config: &SubDeviceConfig) -> String {
+    let mut config = config.clone();
+    config.startup.sort_by_key(|command| command.transition as u8);
+    let limits = STATES.map(|from| STATES.map(|to| config.limit(from, to)));
+    config.state_timeouts.clear();
+    format!("{config:#?} {limits:?}")
+}
+
+fn assert_same(name: &str, expected: &Configuration, got: &Configuration) {
+    for (expected, got) in expected.declaration.subdevices.iter().zip(&got.declaration.subdevices) {
+        assert_eq!(settings(expected), settings(got), "{name}");
+    }
+    assert_eq!(expected.subdevices.len(), got.subdevices.len(), "{name}");
+    for (expected, got) in expected.subdevices.iter().zip(&got.subdevices) {
+        assert_eq!((&expected.name, expected.plugged_into), (&got.name, got.plugged_into), "{name}");
+        // 0 is no address.
+        assert!(expected.station.is_none_or(|it| it == 0 || Some(it) == got.station), "{name}");
+    }
+    let domains = |of: &Configuration| format!("{:?}", of.declaration.domains);
+    assert_eq!(domains(expected), domains(got), "{name}");
+    assert_eq!(expected.declaration.clocks, got.declaration.clocks, "{name}");
+    assert_eq!((&expected.groups, expected.cycle), (&got.groups, got.cycle), "{name}");
+    assert_eq!(expected.image, got.image, "{name}");
+    let lrw = |of: &Configuration| !of.declaration.explicit_lrw.is_empty();
+    assert_eq!(lrw(expected), lrw(got), "{name}");
+}
+
+// covers: eni-run
+#[test]
+fn the_model_of_every_file_is_the_same_when_it_is_written_and_read() {
+    for (name, text) in files() {
+        let written = eni::write(&model(&text));
+        let (got, expected) = (bare(&written), bare(&text));
+        let at = got.bytes().zip(expected.bytes()).take_while(|(got, expected)| got == expected).count();
+        let near = |text: &str| text.chars().skip(at.saturating_sub(200)).take(400).collect::<String>();
+        assert!(got == expected, "{name}: {} instead of {}", near(&got), near(&expected));
+    }
+}
+
+// covers: eni-run
+#[test]
+fn every_eni_gives_the_same_declaration_when_it_is_exported_and_read() {
+    for (name, text) in files() {
+        let export = again(&text, &ExportOptions::default()).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_same(&name, &configured(&text), &export.configuration);
+        assert_same(&name, &export.configuration, &configured(&export.text));
+        let second = again(&export.text, &ExportOptions::default()).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!(second.text, export.text, "{name}: the second export is the first one");
+        assert_eq!(second.left_out, [], "{name}");
+    }
+}
+
+// covers: eni-run
+#[test]
+fn an_eni_is_exported_with_lrw_and_without_it() {
+    for (name, text) in files() {
+        let before = configured(&text);
+        let without = again(&text, &ExportOptions::default().with_lrw(LrwUse::Never)).unwrap();
+        assert_eq!(without.configuration.declaration.explicit_lrw, [], "{name}");
+        assert_eq!(without.configuration.image, before.image, "{name}");
+        let with = again(&text, &ExportOptions::default().with_lrw(LrwUse::Always)).unwrap();
+        let has_data = before.image.areas.iter().any(|area| area.sync_manager.is_some());
+        assert_eq!(with.configuration.declaration.explicit_lrw.is_empty(), !has_data, "{name}");
+        let commands = |text: &str, code: u8| text.matches(&format!("<Cmd>{code}</Cmd>")).count();
+        assert_eq!((commands(&with.text, 10), commands(&with.text, 11)), (0, 0), "{name}: no LRD, no LWR");
+        assert_eq!(commands(&without.text, 12), 0, "{name}: no LRW");
+    }
+}
+
+/// The text with another number at each place where it has one.
+fn mutants(text: &str) -> impl Iterator<Item = String> + '_ {
+    let ends = text.match_indices("</").map(|(at, _)| at);
+    let numbers = ends.filter_map(|end| {
+        let begin = text[..end].rfind('>')? + 1;
+        let number = &text[begin..end];
+        (!number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())).then_some((begin, end))
+    });
+    numbers.flat_map(move |(begin, end)| {
+        let values = ["0", "1", "7", "0200", "65535", "4294967295"];
+        values.into_iter().map(move |value| format!("{}{value}{}", &text[..begin], &text[end..]))
+    })
+}
+
+// covers: eni-run
+#[test]
+fn a_changed_number_gives_the_same_declaration_again_or_a_refusal() {
+    let (mut same, mut refused) = (0, 0);
+    // A part of them: all take minutes without optimization.
+    for text in mutants(SMALL).step_by(5) {
+        let Ok(configuration) = eni::read(text.as_bytes()).and_then(|eni| follow(&eni)) else { continue };
+        match again(&text, &ExportOptions::default()) {
+            Ok(export) => {
+                assert_same(&text, &configuration, &export.configuration);
+                same += 1;
+            }
+            Err(error) => {
+                assert!(!error.reason.is_empty() && !error.what.is_empty(), "{error}");
+                refused += 1;
+            }
+        }
+    }
+    assert!(same > 100 && refused < same / 4, "{same} are the same, {refused} are refused");
+}

@@ -1,0 +1,97 @@
+//! ENIs that RingCAT has written: of a scan, of other ENIs, with LRW and without it. They reach OP on the bus for which
+//! they were made, and each variable is where the file says.
+
+use std::path::Path;
+use std::time::Duration;
+
+use ringcat::config::network::model::Sync;
+use ringcat::config::{Export, ExportDetails, ExportOptions, LrwUse, export};
+use ringcat::eni::EniFile;
+use ringcat::network::{NetworkFile, ScanOptions};
+use ringcat::simulated::SimulatedSegment;
+use ringcat::{MainDevice, Options, SyncSignals};
+use ringcat_sim::network::Network;
+use ringcat_sim::segment::Segment;
+use scenarios::dice::Dice;
+
+use super::{Plant, REAL, activate_on, machine, real, start};
+
+const PERIOD: Duration = Duration::from_millis(1);
+/// Terminals, an analog one with a mailbox, and two drives.
+const BUS: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n\
+                   [[device]]\ntype = \"digital-output-8\"\ncount = 2\n\
+                   [[device]]\ntype = \"digital-input-8\"\n[[device]]\ntype = \"servo\"\ncount = 2\n";
+
+fn network(text: &str) -> Network {
+    let segment = Segment::from_toml(text, Path::new(".")).expect("the segment is valid");
+    Network::from_description(segment).expect("its devices are there")
+}
+
+/// The network file of a scan, with clocks and SYNC0 in the drives.
+fn scanned() -> NetworkFile {
+    let links = SimulatedSegment::from_toml(BUS).expect("the segment is valid");
+    let mut main_device = MainDevice::request(links, &Options::default());
+    let scan = main_device.scan().expect("the scan succeeds");
+    let mut options = ScanOptions::new("machine", PERIOD);
+    options.clocks = true;
+    let mut file = NetworkFile::from_scan(&scan.subdevices, &scan.topology, &options);
+    for drive in file.subdevice.iter_mut().filter(|it| it.name.starts_with("servo")) {
+        drive.sync = Some(Sync::from(SyncSignals::sync0(1_000_000, 0)));
+    }
+    file
+}
+
+fn read(export: &Export) -> EniFile {
+    EniFile::from_bytes(export.text.as_bytes()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// To OP, then all variables are compared with the devices. Returns how many outputs and inputs there were.
+fn proven(mut plant: Plant, seed: u64) -> [usize; 2] {
+    plant.settle();
+    plant.compare(&mut Dice::new(seed))
+}
+
+// covers: eni-run
+#[test]
+fn the_eni_of_a_scan_reaches_op_on_its_bus_with_each_variable_in_its_place() {
+    let file = scanned();
+    for (lrw, seed) in [(LrwUse::Never, 1), (LrwUse::AsDeclared, 2)] {
+        let export = file.to_eni(&ExportOptions::default().with_lrw(lrw)).unwrap_or_else(|error| panic!("{error}"));
+        let plant = activate_on(network(BUS), read(&export), false).expect("the network is the one of the file");
+        let [outputs, _] = proven(plant, seed);
+        assert!(outputs >= 16 + 2 * 3, "{outputs} outputs");
+    }
+}
+
+/// One LRW for all is for a line: a ring refuses it.
+// covers: eni-run
+#[test]
+fn the_eni_of_a_scan_with_lrw_reaches_op_on_a_line() {
+    let export = scanned().to_eni(&ExportOptions::default().with_lrw(LrwUse::Always)).expect("it has an ENI");
+    let refused = start(network(BUS), read(&export), false).err().expect("a ring refuses LRW").to_string();
+    assert!(refused.contains("LRW"), "{refused}");
+    let plant = activate_on(network(&BUS.replace("ring = true", "")), read(&export), false).expect("a line");
+    let [outputs, _] = proven(plant, 3);
+    assert!(outputs >= 16 + 2 * 3, "{outputs} outputs");
+}
+
+// covers: eni-run
+#[test]
+fn a_segment_made_of_an_exported_eni_reaches_op() {
+    let export = scanned().to_eni(&ExportOptions::default()).expect("it has an ENI");
+    let network = read(&export).simulated(false).expect("a segment");
+    proven(activate_on(network, read(&export), false).expect("its own segment"), 4);
+}
+
+// covers: eni-run
+#[test]
+fn an_exported_eni_reaches_op_on_the_segment_of_the_eni_it_was_made_of() {
+    let files = REAL.iter().filter_map(|(name, _)| real(name)).chain([machine()]);
+    for (seed, file) in (10..).zip(files) {
+        let made = export(&file.configuration, &ExportDetails::of(&file.eni), &ExportOptions::default());
+        let export = made.unwrap_or_else(|error| panic!("{error}"));
+        let network = file.simulated(false).expect("a segment");
+        let [outputs, inputs] = proven(activate_on(network, read(&export), false).expect("its segment"), seed);
+        assert!(outputs + inputs > 8, "{outputs} outputs, {inputs} inputs");
+    }
+}
