@@ -156,8 +156,8 @@ impl Client {
         }
     }
 
-    /// As [`Client::ask`]. While the master passes from one process to another, or its owner has as many questions as it
-    /// may have, it is asked again, for up to 5 s.
+    /// As [`Client::ask`]. While the master passes from one process to another, or its owner has as many questions as
+    /// it may have, it is asked again, for up to 5 s.
     ///
     /// # Errors
     /// As [`Client::ask`].
