@@ -165,7 +165,7 @@ impl TapInterface {
         if flags & libc::IFF_TAP == 0 {
             return Err(failed(libc::ENOTTY));
         }
-        let name: Vec<u8> = request.ifr_name.iter().take_while(|it| **it != 0).map(|it| *it as u8).collect();
+        let name: Vec<u8> = request.ifr_name.iter().take_while(|it| **it != 0).map(|it| it.to_ne_bytes()[0]).collect();
         Ok(TapInterface { fd, name: String::from_utf8_lossy(&name).into_owned() })
     }
 
