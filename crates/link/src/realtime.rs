@@ -50,6 +50,17 @@ const PERMIT_FIFO: &str = "permit it with cap_sys_nice (setcap) or an rtprio lim
 const PERMIT_LATENCY: &str = "permit writing to it (a udev rule, or root); until then a sleeping processor may take \
                               long to wake up";
 
+/// Gives memory that the program has freed back to the system, where the C library keeps it (glibc; elsewhere nothing
+/// is done). It waits for locks of the heap, for up to a millisecond: not for the cyclic thread, which may not allocate
+/// meanwhile.
+pub fn give_back_memory() {
+    // SAFETY: no pointers are passed; the heap is locked while it is changed.
+    #[cfg(target_env = "gnu")]
+    unsafe {
+        libc::malloc_trim(0);
+    }
+}
+
 /// Keeps all memory of this process, present and future, from being swapped out.
 pub fn lock_memory() -> Result<(), RealtimeWarning> {
     let failed = |errno| RealtimeWarning::new("memory is not locked", errno, PERMIT_MEMORY);

@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::hint::black_box;
+use std::io::{BufRead, BufReader};
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -21,6 +22,8 @@ const WARM_UP: u64 = 50;
 /// Time limit from activation to OP, under valgrind.
 const OP_LIMIT: Duration = Duration::from_secs(60);
 const STOP_LIMIT: Duration = Duration::from_secs(10);
+/// Bytes of the list of mappings that are read at once.
+const LIST_BUFFER: usize = 1_024;
 /// The spinning part of a hybrid wait, as in `ringcat run`.
 const SPIN: Duration = Duration::from_micros(200);
 
@@ -123,26 +126,28 @@ fn work(data: &mut ProcessData<'_>) {
     }
 }
 
-/// Resident memory in kB: in total, and by mapping.
+/// Resident memory in kB: in total, and by mapping. The kernel's list is read line by line, because memory for all of it
+/// would be in it.
 fn memory() -> Tried<Vec<(String, u64)>> {
-    let maps = fs::read_to_string("/proc/self/smaps").map_err(said)?;
-    let mut parts: BTreeMap<&str, u64> = BTreeMap::new();
+    let mut maps = BufReader::with_capacity(LIST_BUFFER, fs::File::open("/proc/self/smaps").map_err(said)?);
+    let (mut parts, mut line) = (BTreeMap::<&str, u64>::new(), String::new());
     let mut part = "";
-    for line in maps.lines() {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        match words[..] {
-            [range, _, _, _, _, ref name @ ..] if range.contains('-') => part = kind(name),
-            ["Rss:", size, "kB"] => *parts.entry(part).or_default() += number::<u64>(size)?,
+    while maps.read_line(&mut line).map_err(said)? > 0 {
+        let mut words = line.split_whitespace();
+        match (words.next(), words.next()) {
+            (Some("Rss:"), Some(size)) => *parts.entry(part).or_default() += number::<u64>(size)?,
+            (Some(range), Some(_)) if range.contains('-') => part = kind(words.nth(3)),
             _ => {}
         }
+        line.clear();
     }
     let all = ("resident".to_owned(), parts.values().sum());
     Ok(std::iter::once(all).chain(parts.into_iter().map(|(name, size)| (format!("of it {name}"), size))).collect())
 }
 
 /// Kind of a mapping.
-fn kind(name: &[&str]) -> &'static str {
-    match name.first() {
+fn kind(name: Option<&str>) -> &'static str {
+    match name {
         None => "stacks and heaps of threads",
         Some(name) if name.contains("[heap]") => "heap",
         Some(name) if name.contains("[stack]") => "stacks and heaps of threads",
