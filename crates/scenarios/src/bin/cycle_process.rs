@@ -126,8 +126,8 @@ fn work(data: &mut ProcessData<'_>) {
     }
 }
 
-/// Resident memory in kB: in total, and by mapping. The kernel's list is read line by line, because memory for all of it
-/// would be in it.
+/// Resident memory in kB: in total, and by mapping. The kernel's list is read line by line, because memory for all of
+/// it would be in it.
 fn memory() -> Tried<Vec<(String, u64)>> {
     let mut maps = BufReader::with_capacity(LIST_BUFFER, fs::File::open("/proc/self/smaps").map_err(said)?);
     let (mut parts, mut line) = (BTreeMap::<&str, u64>::new(), String::new());
