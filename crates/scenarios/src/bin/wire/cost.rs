@@ -66,9 +66,8 @@ impl Wire {
             calls.push((total, number("sendto").unwrap_or_default()));
         }
         let cycles = f64::from(COUNTED[1] - COUNTED[0]);
-        // Some belong to the longer run as a whole, such as memory for its times, or come every 5 ms, which are 200
-        // cycles under strace: less than one per hundred cycles.
-        let per_cycle = ((calls[1].0 - calls[0].0) / cycles * 100.0).floor() / 100.0;
+        // Some belong to the longer run as a whole, such as memory for its times: less than one per hundred cycles.
+        let per_cycle = ((calls[1].0 - calls[0].0) / cycles * 100.0).round() / 100.0;
         Ok((per_cycle, (calls[1].1 - calls[0].1) / cycles))
     }
 
