@@ -1,6 +1,6 @@
 //! How the thread that sends and receives works: waiting, real-time priority, processor.
 
-use std::sync::Once;
+use std::sync::{LazyLock, Once};
 use std::thread::available_parallelism;
 use std::time::Duration;
 
@@ -46,6 +46,12 @@ pub struct ThreadArguments {
     cpu: Option<usize>,
 }
 
+/// Number of processors that this process may use, as it was before the first thread was bound to one.
+fn processors() -> usize {
+    static PROCESSORS: LazyLock<usize> = LazyLock::new(|| available_parallelism().map_or(1, usize::from));
+    *PROCESSORS
+}
+
 impl ThreadArguments {
     /// The receive mode of the links.
     pub fn mode(self) -> ReceiveMode {
@@ -69,8 +75,7 @@ impl ThreadArguments {
     /// everything else in this program from running, and with a priority for ever.
     fn receive(self) -> Receive {
         static WARNED: Once = Once::new();
-        let processors = available_parallelism().map_or(1, usize::from);
-        if self.receive == Receive::Block || processors > 1 {
+        if self.receive == Receive::Block || processors() > 1 {
             return self.receive;
         }
         WARNED.call_once(|| {
@@ -87,6 +92,8 @@ impl ThreadArguments {
 
     /// Applies the options to the calling thread, which runs the cycles. A missing permission is a warning.
     pub fn prepare_cycles(self) {
+        // Before this thread has one of them only.
+        let _ = processors();
         realtime::precise_timers();
         if let Some(cpu) = self.cpu {
             let _ = realtime::affinity(cpu).map_err(warn);
@@ -114,5 +121,25 @@ impl ThreadArguments {
         self.priority?;
         let _ = realtime::lock_memory().map_err(warn);
         CpuLatency::request(0).map_err(warn).ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // covers: run, bench
+    #[test]
+    fn a_thread_that_is_bound_to_one_processor_spins_where_there_are_others() {
+        let expected = match available_parallelism().map_or(1, usize::from) {
+            1 => ReceiveMode::Blocking,
+            _ => ReceiveMode::BusyPoll,
+        };
+        let bound = std::thread::spawn(|| {
+            let arguments = ThreadArguments { receive: Receive::Busy, priority: None, cpu: Some(0) };
+            arguments.prepare_cycles();
+            arguments.mode()
+        });
+        assert_eq!(bound.join().expect("it ends"), expected);
     }
 }
