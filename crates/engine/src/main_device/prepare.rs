@@ -11,6 +11,7 @@ use core::time::Duration;
 
 use ringcat_wire::address::Position;
 use ringcat_wire::al::AlState;
+use ringcat_wire::datagram::MAX_DATA;
 use ringcat_wire::register::{WatchdogDivider, WatchdogTime};
 
 use super::activate_error::ActivateError;
@@ -25,7 +26,7 @@ use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::layout::{AreaSpec, DomainSpec, ImageOrder, Layout, LrwPolicy, Witness};
 use crate::link::LinkSet;
-use crate::plan::{PlanFault, SubDevicePlan, plan};
+use crate::plan::{PlanError, PlanFault, PlanProblem, SubDevicePlan, plan};
 use crate::procedures::request_state::exchanges;
 use crate::procedures::scan::station_at;
 use crate::procedures::shared_segment::SharedSegment;
@@ -131,12 +132,34 @@ fn plan_one(
         Ok(_) if !exchanges(config.target) => Ok(Areas::Planned(None)),
         Ok(plan) => match misplaced(declaration, subdevice, &plan) {
             Some(error) if fails_alone(declaration) => unfit(error),
-            _ => Ok(Areas::Planned(Some(plan))),
+            _ => match beyond_datagram(declaration, subdevice, config, info, &plan) {
+                Some(error) => unfit(error),
+                None => Ok(Areas::Planned(Some(plan))),
+            },
         },
         // A bad EEPROM fails only its own SubDevice.
         Err(error) if error.fault == PlanFault::Sii || fails_alone(declaration) => unfit(SetupError::Plan(error)),
         Err(error) => Err(ActivateError::Setup { subdevice, error: SetupError::Plan(error) }),
     }
+}
+
+/// Process data that no datagram can carry, where the SII alone says so: all of it is placed.
+fn beyond_datagram(
+    declaration: &Declaration,
+    subdevice: SubDeviceId,
+    config: &SubDeviceConfig,
+    info: &SubDeviceInfo,
+    plan: &SubDevicePlan,
+) -> Option<SetupError> {
+    let mut registered = declaration.domains.iter().flat_map(|domain| &domain.registered);
+    if config.declared.is_some() || config.pdos.is_some() || registered.any(|area| area.subdevice == subdevice) {
+        return None;
+    }
+    let mut areas = planned_areas(plan).into_iter();
+    let (sync_manager, _, length) = areas.find(|(.., length)| usize::from(*length) > MAX_DATA)?;
+    let problem = PlanProblem::BeyondDatagram { sync_manager, length };
+    let (position, station) = (info.position, info.station);
+    Some(SetupError::Plan(PlanError { position, station, problem, fault: PlanFault::Sii }))
 }
 
 /// A registered area of a SubDevice that has another size or direction than its process data now.

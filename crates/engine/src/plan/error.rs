@@ -6,6 +6,7 @@ use core::fmt;
 use core::ops::Range;
 
 use ringcat_wire::address::{Position, RegisterAddress, StationAddress};
+use ringcat_wire::datagram::MAX_DATA;
 use ringcat_wire::mailbox::soe::Idn;
 
 use crate::info::Direction;
@@ -110,6 +111,13 @@ pub enum PlanProblem {
         sync_manager: u8,
         /// Requested bits.
         bits: u64,
+    },
+    /// More process data of a SyncManager than a datagram carries.
+    BeyondDatagram {
+        /// The SyncManager.
+        sync_manager: u8,
+        /// Its bytes.
+        length: u16,
     },
     /// An area outside the memory of the controller.
     OutsideMemory {
@@ -268,6 +276,9 @@ impl fmt::Display for PlanProblem {
             }
             Self::TooLong { sync_manager, bits } => {
                 write!(f, "SM {sync_manager}: {bits} bits of process data, expected at most 524280")
+            }
+            Self::BeyondDatagram { sync_manager, length } => {
+                write!(f, "SM {sync_manager}: {length} bytes of process data, a datagram carries at most {MAX_DATA}")
             }
             Self::NoMemory { sync_manager, start } => {
                 write!(f, "SM {sync_manager}: no memory for its direction at {start:#06x}")

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 use std::time::Duration;
 
-use ringcat::{ConfigureError, Event, Limits, SubDeviceId, SubDeviceState};
+use ringcat::{ConfigureError, Event, Limits, SdoFailure, SubDeviceId, SubDeviceState};
 use ringcat_engine::UnderWay;
 use ringcat_engine::mail::eoe::EthernetPort;
 use ringcat_engine::main_device::Pending;
@@ -118,7 +118,8 @@ fn happen(world: &mut World, beside: &mut MailboxUsers, dice: &mut Dice, emergen
 }
 
 /// Requests a state of a device, and waits for it while its users go on. A request that meets a device without power
-/// fails, and the device reaches the state after its return.
+/// fails, and the device reaches the state after its return. One that meets an injected abort, which the assignment of
+/// PDOs may, fails and leaves the device where it was: it is made again.
 fn change_state(world: &mut World, beside: &mut MailboxUsers, device: usize, state: AlState) {
     let mut request = world.application_mut().engine_mut().start_state_request(SubDeviceId(device), state);
     let until = world.application().now() + END;
@@ -127,10 +128,19 @@ fn change_state(world: &mut World, beside: &mut MailboxUsers, device: usize, sta
         assert!(world.application().now() < until, "device {device} does not reach {state:?}: {result:?}");
         beside.run_cycles(world, 1);
         result = result.or_else(|| request.take());
+        if result.as_ref().is_some_and(is_injected_abort) {
+            request = world.application_mut().engine_mut().start_state_request(SubDeviceId(device), state);
+            result = None;
+        }
     }
     if let Some(Err(error)) = result {
         assert!(!matches!(error, ConfigureError::State(_)), "device {device} refused {state:?}: {error}");
     }
+}
+
+fn is_injected_abort(result: &Result<(), ConfigureError>) -> bool {
+    let Err(ConfigureError::Sdo(error)) = result else { return false };
+    error.cause == SdoFailure::Aborted(AbortCode::GENERAL)
 }
 
 /// Sends requests of one kind, one after the other, until the stop; dropped ones are not counted.

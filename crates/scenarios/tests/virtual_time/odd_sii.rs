@@ -268,6 +268,14 @@ fn an_invalid_sii_stops_only_its_own_subdevice() {
     let reason =
         "its SII cannot be used: SM 3: 12 bytes (all buffers) at 0x2ffe exceed the memory, which ends at 0x3000";
     others_run_and_it_says(world(devices, ReadPdos::Missing), reason);
+    // More process data than a datagram carries.
+    let mut devices = descriptions(&KINDS);
+    let mut long = devices[ODD].clone();
+    long.pdos.retain(|pdo| pdo.sync_manager != Some(3));
+    (long.sync_managers[3].start, long.sync_managers[3].length) = (0x1A00, 1_600);
+    devices[ODD].sii_image = Some(sii_image::build(&long));
+    let reason = "its SII cannot be used: SM 3: 1600 bytes of process data, a datagram carries at most 1486";
+    others_run_and_it_says(world(devices, ReadPdos::Never), reason);
     // A blank EEPROM.
     let mut devices = descriptions(&KINDS);
     devices[ODD].sii_image = Some(Vec::new());
