@@ -107,6 +107,7 @@ impl MainDevice {
     pub fn apply(&mut self) -> Result<Active, ActivateError> {
         self.permit(Function::Activate)?;
         let loaded = self.loaded.clone().ok_or(ActivateError::NotLoaded)?;
+        self.segment.observe_written_pdos();
         let session = self.next_session(self.supervisor.bus().now());
         let (active, segment) = self.prepare_loaded(loaded, session)?;
         self.start_procedures(segment);

@@ -175,13 +175,22 @@ impl SharedSegment {
         }
     }
 
-    /// Passes to the model which members have got mail that has changed their PDOs since they were known.
+    /// Passes to the model which SubDevices have got mail that has changed their PDOs since they were known: before
+    /// their mailboxes are closed.
     pub(crate) fn observe_written_pdos(&self) {
+        self.observe_undeclared_pdos();
         for (index, mailbox) in self.mailboxes.iter().enumerate().filter(|(_, mailbox)| mailbox.has_written_pdos()) {
             mailbox.forget_written_pdos();
             let attempt = self.view().member(index).map(|member| member.attempt);
             let outdated = |attempt| self.observe_member((index, attempt), MemberFinding::Pdos(PdoFinding::Outdated));
             attempt.into_iter().for_each(outdated);
+        }
+    }
+
+    /// The same for those without a declaration.
+    pub(super) fn observe_undeclared_pdos(&self) {
+        for key in self.undeclared.take_written_pdos() {
+            self.observe_undeclared(UndeclaredObservation::Pdos { key, finding: PdoFinding::Outdated });
         }
     }
 

@@ -7,7 +7,6 @@ use ringcat_wire::register::SyncManagerStatus;
 
 use crate::mail::Mailbox;
 use crate::procedures::shared_segment::SharedSegment;
-use crate::segment::{PdoFinding, UndeclaredObservation};
 use crate::supervisor::Bus;
 
 /// Pause between two rounds: no cycle waits for this mail.
@@ -17,9 +16,7 @@ const PAUSE: Duration = Duration::from_millis(100);
 pub(crate) async fn watch_undeclared_mail(bus: Bus, segment: SharedSegment) {
     loop {
         bus.sleep(PAUSE).await;
-        for key in segment.undeclared.take_written_pdos() {
-            segment.observe_undeclared(UndeclaredObservation::Pdos { key, finding: PdoFinding::Outdated });
-        }
+        segment.observe_undeclared_pdos();
         bus.gather_in_turns(segment.undeclared.in_use(), poll).await;
     }
 }

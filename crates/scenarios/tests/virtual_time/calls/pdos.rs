@@ -221,6 +221,35 @@ fn pdos_that_are_changed_by_sdo_are_known_within_100_ms() {
     }
 }
 
+/// The same where an application begins or ends right after it: mailboxes end then.
+// covers: states, mailbox
+#[test]
+fn pdos_that_are_changed_by_sdo_beside_an_application_are_known_after_it() {
+    for (_, mut ecrt) in requested() {
+        let assign = |ecrt: &mut Ecrt, pdo: u16| {
+            let [low, high] = pdo.to_le_bytes();
+            for (sub_index, data) in [(0, &[0][..]), (1, &[low, high]), (0, &[1])] {
+                ecrt.sdo_download(0, 0x1C12, sub_index, data).expect("it is in PREOP");
+            }
+        };
+        for (pdo, text) in [(0x1601, "before the activation"), (0x1600, "before the end")] {
+            if text == "before the activation" {
+                assign(&mut ecrt, pdo);
+            }
+            ecrt.activate().expect("nothing is declared");
+            ecrt.cycles(5);
+            if text == "before the end" {
+                assign(&mut ecrt, pdo);
+            }
+            ecrt.deactivate().expect("all follow");
+            ecrt.pause(Duration::from_millis(300));
+            assert_said(&mut ecrt, text);
+            let assigned = ecrt.side.engine().subdevices()[0].assigned_pdos(2).next().map(|pdo| pdo.index);
+            assert_eq!(assigned, Some(pdo), "{text}");
+        }
+    }
+}
+
 /// The events of a program since the last look.
 fn said_by(ecrt: &mut Ecrt) -> Vec<ringcat::Event> {
     ecrt.look();
