@@ -14,7 +14,7 @@ use ringcat::piped::segment::PipedSegment;
 use ringcat::sim::network::Network;
 use ringcat::sim::segment::Segment;
 use ringcat::{Activity, AlState, AlStatus, Options};
-use ringcat_control::{Answer, Ask};
+use ringcat_control::{Answer, Query};
 use ringcatd::daemon::Daemon;
 use ringcatd::master::{Master, Settings};
 use ringcatd::rights::Rights;
@@ -106,7 +106,7 @@ impl Bench {
         let bench = Bench { socket, daemon, looks, segment, directory, _turn: turn };
         bench.wait_until("all in PREOP", |bench| bench.are_in(AlState::PreOp));
         bench.wait_until("scanned", |bench| {
-            let Answer::State(state) = ask(&mut bench.client(), Ask::State) else { return false };
+            let Answer::State(state) = ask(&mut bench.client(), Query::State) else { return false };
             state.activity == Activity::Scanned && state.subdevices.len() == count
         });
         bench
@@ -181,6 +181,6 @@ impl Drop for Bench {
 }
 
 /// An answer that is not data.
-pub fn ask(client: &mut Client, ask: Ask) -> Answer {
+pub fn ask(client: &mut Client, ask: Query) -> Answer {
     client.ask(0, ask, Vec::new()).expect("it is answered").0
 }
