@@ -14,6 +14,7 @@ use crate::segment::effect::{Effects, Task};
 use crate::segment::key::SubDeviceKey;
 use crate::segment::model::Segment;
 use crate::segment::pdo_finding::PdoFinding;
+use crate::segment::scan::Found;
 use crate::segment::undeclared::{PdoReading, Upkeep, UpkeepProgress};
 
 /// Dictionaries of SubDevices in their states that are read at once: requests of the application do not wait for those
@@ -56,6 +57,24 @@ impl Segment {
             } else {
                 let (pdos, pdo_source) = (now.pdos.clone(), now.pdo_source);
                 *known = Rc::new(SubDeviceInfo { pdos, pdo_source, ..(**known).clone() });
+            }
+        }
+    }
+
+    /// A scan began with what was known then: a dictionary that was written since then is outdated in what it found,
+    /// too.
+    pub(in crate::segment) fn mark_outdated_pdos(&self, found: &mut Rc<Found>) {
+        let is_outdated = |info: &SubDeviceInfo| {
+            info.pdo_source.is_of_dictionary()
+                && self
+                    .subdevices
+                    .at(info.station)
+                    .and_then(|it| it.knowledge.info())
+                    .is_some_and(|known| known.pdo_source == PdoSource::Outdated && known.identity == info.identity)
+        };
+        if found.subdevices.iter().any(|info| is_outdated(info)) {
+            for info in Rc::make_mut(found).subdevices.iter_mut().filter(|info| is_outdated(info)) {
+                Rc::make_mut(info).pdo_source = PdoSource::Outdated;
             }
         }
     }

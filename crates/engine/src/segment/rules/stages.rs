@@ -53,8 +53,9 @@ impl Segment {
     }
 
     /// The segment was scanned again without an application. A result from before a scan or an application is refused.
-    pub(in crate::segment) fn find_again(&mut self, versions: Versions, found: Rc<Found>) {
+    pub(in crate::segment) fn find_again(&mut self, versions: Versions, mut found: Rc<Found>) {
         let is_valid = self.are_addresses_as_in(versions);
+        self.mark_outdated_pdos(&mut found);
         if let Stage::Scanned(scanned) = &mut self.stage
             && is_valid
         {

@@ -250,6 +250,25 @@ fn pdos_that_are_changed_by_sdo_beside_an_application_are_known_after_it() {
     }
 }
 
+/// The same where nothing is assigned any more, at each moment of what looks for it every 100 ms.
+// covers: states, mailbox
+#[test]
+fn pdos_that_are_removed_by_sdo_right_before_the_end_are_known_after_it() {
+    for (count, mut ecrt) in requested() {
+        for cycles in (0..100).step_by(9) {
+            ecrt.activate().expect("nothing is declared");
+            ecrt.cycles(cycles);
+            ecrt.sdo_download(0, 0x1C13, 0, &[0]).expect("it is in PREOP");
+            ecrt.deactivate().expect("all follow");
+            ecrt.pause(Duration::from_millis(300));
+            assert_said(&mut ecrt, &format!("{count}, {cycles} cycles"));
+            ecrt.sdo_download(0, 0x1C13, 0, &[1]).expect("it is in PREOP");
+            ecrt.pause(Duration::from_millis(300));
+            assert_said(&mut ecrt, &format!("{count}, {cycles} cycles, assigned again"));
+        }
+    }
+}
+
 /// The events of a program since the last look.
 fn said_by(ecrt: &mut Ecrt) -> Vec<ringcat::Event> {
     ecrt.look();

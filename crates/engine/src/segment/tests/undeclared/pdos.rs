@@ -121,3 +121,27 @@ fn pdos_are_awaited_of_those_on_their_way_to_a_state_with_mail_only() {
         assert!(!idle.segment.are_pdos_awaited(), "{state:?}, known");
     }
 }
+
+#[test]
+fn a_dictionary_that_is_written_while_the_segment_is_scanned_is_outdated_in_the_scan() {
+    let mut idle = Idle::kept(&THREE);
+    let source = |idle: &Idle, at: usize| {
+        let found = idle.segment.found().unwrap().subdevices[at].pdo_source;
+        let listed = idle.segment.subdevices().unassigned().nth(at).unwrap();
+        assert_eq!(found, listed.knowledge.info().unwrap().pdo_source);
+        found
+    };
+    for at in 0..2 {
+        idle.seen(UndeclaredObservation::Pdos { key: idle.key(at), finding: PdoFinding::Held(&[]) });
+    }
+    let begun = (idle.segment.versions(), (**idle.segment.found().unwrap()).clone());
+    idle.seen(UndeclaredObservation::Pdos { key: idle.key(0), finding: PdoFinding::Outdated });
+    idle.observe(Observation::FoundAgain { versions: begun.0, found: Rc::new(begun.1) });
+    assert_eq!((source(&idle, 0), source(&idle, 1)), (PdoSource::Outdated, PdoSource::Dictionary));
+    // Another SubDevice at its address: nothing of it is outdated.
+    let mut others = found(&[(0x1001, 9), (0x1002, 2), (0x1003, 3)]);
+    others.subdevices[0].pdo_source = PdoSource::Dictionary;
+    let versions = idle.segment.versions();
+    idle.observe(Observation::FoundAgain { versions, found: Rc::new(Found::from(others)) });
+    assert_eq!(source(&idle, 0), PdoSource::Dictionary);
+}
