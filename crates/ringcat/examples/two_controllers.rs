@@ -15,13 +15,13 @@ use ringcat::{AlState, AlStatus, Error, Event, MainDevice, Options, automatic};
 
 const CYCLE: Duration = Duration::from_millis(1);
 
-/// The program of each controller.
-fn controller(mut links: HostLinks) -> Result<(), Error> {
+/// The program of each controller. The one that listens for a shorter time becomes ACTIVE first.
+fn controller(mut links: HostLinks, listen: Duration) -> Result<(), Error> {
     let host = links.host();
     // Links are up only while the program forwards or is ACTIVE.
     links.switch(true);
     let options = Options::default().with_standby(StandbyOptions::default());
-    let policy = Policy::default().with_time_out(3, Duration::ZERO).with_listen(Duration::from_millis(50));
+    let policy = Policy::default().with_time_out(3, Duration::ZERO).with_listen(listen);
     let main_device = MainDevice::request(links, &options);
     let mut application = main_device.join(&policy, |scan| automatic(&scan.subdevices, CYCLE))?;
     println!("{host:?} begins {}", application.role());
@@ -44,13 +44,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let kinds = ["coupler", "digital-output-8", "digital-input-8", "servo"];
     let devices = kinds.iter().filter_map(|kind| catalogue::by_name(kind)).map(Device::new).collect();
     let mut hosts = TwoHosts::new(SegmentBuilder::ring_of_two(devices, Host::First).build()?);
-    for host in Host::ALL {
-        hosts.start(host, |links| {
-            if let Err(error) = controller(links) {
+    for (host, listen) in [(Host::First, Duration::from_millis(10)), (Host::Second, Duration::from_millis(500))] {
+        hosts.start(host, move |links| {
+            if let Err(error) = controller(links, listen) {
                 eprintln!("{error}");
             }
         })?;
-        hosts.run_for(Duration::from_millis(5));
     }
     hosts.run_for(Duration::from_secs(1));
     println!("{} SubDevices in OP; the first controller dies", hosts.with_network(in_op));

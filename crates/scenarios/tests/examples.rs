@@ -13,7 +13,7 @@ const RUN: [(&str, &[&str], &str); 9] = [
     ("ring_with_a_cut", &[], "ring Open, broken between SubDevice 1 port 1 and SubDevice 2 port 0"),
     ("running_light", &[], "working counter 2 of 2 after 500 cycles"),
     ("sdo_from_another_thread", &[], "SDO 0x7777:00: aborted by the SubDevice: 0x06020000"),
-    ("two_controllers", &[], "4 SubDevices in OP, by the second controller"),
+    ("two_controllers", &[], "Second: taken over: 4 SubDevices go on as they are"),
     ("two_threads", &[], "working counter 1 of 1; "),
 ];
 
