@@ -49,7 +49,9 @@ fn place(prefix: &Path) -> Option<PathBuf> {
     }
     script(&place.join("bin/cargo"), "exit 0");
     let (lib, include) = (prefix.join("lib"), prefix.join("include"));
-    let install = format!("mkdir -p \"$2\" && cp -r {} {} \"$2\"", lib.display(), include.display());
+    // The real one compiles for a while: the daemon of the line before listens by then. This one waits for it.
+    let listens = "i=0; until test -S /tmp/ringcat-$(id -u)/control || test $i = 600; do sleep 0.1; i=$((i+1)); done";
+    let install = format!("mkdir -p \"$2\" && cp -r {} {} \"$2\"\n{listens}", lib.display(), include.display());
     script(&place.join("crates/ffi/install"), &install);
     let examples = place.join("examples/c");
     fs::create_dir_all(&examples).expect("it can be made");
