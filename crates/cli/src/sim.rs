@@ -1,9 +1,9 @@
 //! `ringcat sim`: a simulated segment behind real network interfaces, for this MainDevice and for those of others.
 
-mod doors;
 mod lateness;
 mod mail_orders;
 mod names;
+mod order_sources;
 mod orders;
 mod plant;
 mod residence;
@@ -28,7 +28,7 @@ use crate::others::check_sockets;
 use crate::output::{counted, say, write_event};
 use crate::thread::ThreadArguments;
 use crate::verdict::{Report, Verdict};
-use doors::Doors;
+use order_sources::OrderSources;
 use orders::{Outcome, carry_out};
 use plant::Plant;
 use wires::{Pace, Wires};
@@ -83,7 +83,7 @@ pub fn run(arguments: &SimArguments) -> Result<Report, Failure> {
         // A ring without its second interface is one whose last cable is not plugged in.
         plant.set_carrier(HostLink::Redundant, false);
     }
-    let doors = Doors::open(arguments.control.as_deref()).map_err(|error| {
+    let sources = OrderSources::open(arguments.control.as_deref()).map_err(|error| {
         Failure::new(format!("the control socket cannot be made: {error}; is its directory there?"))
     })?;
     // The threads above stay ordinary ones.
@@ -103,7 +103,7 @@ pub fn run(arguments: &SimArguments) -> Result<Report, Failure> {
                 say(now, &format!("{link} interface: carrier {}", if up { "is back" } else { "is gone" }));
             }
         }
-        while let Some(order) = doors.next() {
+        while let Some(order) = sources.next() {
             let (text, quit) = match carry_out(&order.line, &mut plant) {
                 Outcome::Answer(text) if order.line.trim() == "status" => {
                     (format!("{}\n{text}", wires.summary()), false)

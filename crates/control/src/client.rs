@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use ringcat_link::process::wait_readable;
 
 use crate::connection::{Connection, ReceiveError};
-use crate::message::{Answer, Ask, Content, Message, Numbered, Right};
+use crate::message::{Answer, Content, Message, Numbered, Query, Right};
 use crate::refusal::Refusal;
 use crate::wire::{Limits, WireError};
 
@@ -138,10 +138,10 @@ impl Client {
     ///
     /// # Errors
     /// The daemon refuses, or does not answer in time: within a minute, or 10 minutes where flash memory is written.
-    pub fn ask(&mut self, master: u32, what: Ask, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), ClientError> {
+    pub fn ask(&mut self, master: u32, what: Query, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), ClientError> {
         self.next = self.next.wrapping_add(1);
         let limit = what.limit() + BEYOND;
-        let content = Content::Ask(Numbered { id: self.next, master, what });
+        let content = Content::Query(Numbered { id: self.next, master, what });
         self.connection.send(&Message { content, bytes })?;
         loop {
             let message = self.connection.receive(Limits::OWNER, Some(limit))?;
@@ -161,7 +161,7 @@ impl Client {
     ///
     /// # Errors
     /// As [`Client::ask`].
-    pub fn ask_patiently(&mut self, master: u32, what: &Ask, bytes: &[u8]) -> Result<(Answer, Vec<u8>), ClientError> {
+    pub fn ask_patiently(&mut self, master: u32, what: &Query, bytes: &[u8]) -> Result<(Answer, Vec<u8>), ClientError> {
         let begin = Instant::now();
         loop {
             match self.ask(master, what.clone(), bytes.to_vec()) {
@@ -210,7 +210,7 @@ mod tests {
             connection.send(&welcome.into()).expect("the client listens");
             let (mut refusals, mut questions) = (refusals.into_iter(), 0);
             while let Ok(message) = connection.receive(Limits::OWNER, Some(GREETING)) {
-                let Content::Ask(Numbered { id, master, .. }) = message.content else { panic!("{message:?}") };
+                let Content::Query(Numbered { id, master, .. }) = message.content else { panic!("{message:?}") };
                 questions += 1;
                 let what = refusals.next().map_or_else(|| Ok(Answer::Masters(Vec::new())), Err);
                 connection.send(&Content::Answer(Numbered { id, master, what }).into()).expect("the client listens");
@@ -223,7 +223,7 @@ mod tests {
     fn ask(refusals: Vec<Refusal>) -> (Result<(Answer, Vec<u8>), ClientError>, usize) {
         let (socket, daemon) = refusing(refusals);
         let mut client = Client::connect(&socket, "test").expect("it listens");
-        let answered = client.ask_patiently(0, &Ask::Masters, &[]);
+        let answered = client.ask_patiently(0, &Query::Masters, &[]);
         drop(client);
         std::fs::remove_file(socket).expect("it is there");
         (answered, daemon.join().expect("it ends"))

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// What a broadcast shows of all SubDevices now.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct SegmentLook {
+pub struct SegmentOverview {
     /// SubDevices that processed the copy on the main link, and on the redundant link.
     pub counts: [u16; 2],
     /// Their AL states, ORed.
@@ -21,7 +21,7 @@ pub struct SegmentLook {
     pub scans: bool,
 }
 
-impl SegmentLook {
+impl SegmentOverview {
     /// SubDevices on both links.
     pub fn responding(&self) -> u16 {
         self.counts[0].saturating_add(self.counts[1])

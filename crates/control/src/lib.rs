@@ -30,7 +30,7 @@ pub use arriving::Arriving;
 pub use client::Client;
 pub use connection::{Connection, ReceiveError};
 pub use message::{
-    Answer, Ask, Content, EventLine, HandedBus, HandedLink, HandedLinks, MasterState, Message, Numbered, Owner, Right,
+    Answer, Content, EventLine, HandedBus, HandedLink, HandedLinks, MasterState, Message, Numbered, Owner, Query, Right,
 };
 pub use refusal::{Refusal, ServiceFault};
 pub use socket::DEFAULT_SOCKET;

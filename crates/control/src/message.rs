@@ -8,10 +8,10 @@ use std::time::Duration;
 pub use ringcat_engine::main_device::snapshot::Snapshot;
 use serde::{Deserialize, Serialize};
 
-pub use crate::information::SegmentLook;
+pub use crate::information::SegmentOverview;
 pub use crate::owner::Owner;
 use crate::refusal::Refusal;
-pub use crate::tool::{ToolAnswer, ToolAsk};
+pub use crate::tool::{ToolAnswer, ToolQuery};
 
 /// Longest time for most answers.
 const USUAL: Duration = Duration::from_secs(30);
@@ -53,7 +53,7 @@ pub enum Content {
         pid: u32,
     },
     /// A question: of a client to the daemon, of the daemon to an owner.
-    Ask(Numbered<Ask>),
+    Query(Numbered<Query>),
     /// An owner has taken a question, and answers when it is done.
     Underway {
         /// Number of the question.
@@ -122,7 +122,7 @@ pub struct Numbered<T> {
 /// What a client may do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Right {
-    /// Ask for what changes nothing.
+    /// Queries that change nothing.
     Read,
     /// Also change states, objects and registers, and drive a master.
     Change,
@@ -131,7 +131,7 @@ pub enum Right {
 /// A question. SubDevices have their positions in the ring, whether an application is active or not.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
-pub enum Ask {
+pub enum Query {
     /// All masters and their owners.
     Masters,
     /// The whole state of a master, its SubDevices with it.
@@ -195,7 +195,7 @@ pub enum Ask {
     /// Scans the segment again.
     Rescan,
     /// What a broadcast shows of all SubDevices now.
-    Look,
+    Overview,
     /// Reads the value of an IDN.
     IdnRead {
         /// Position of the SubDevice.
@@ -215,14 +215,14 @@ pub enum Ask {
         idn: u16,
     },
     /// What the command line tool asks, and clients that want the same.
-    Tool(ToolAsk),
+    Tool(ToolQuery),
 }
 
-impl Ask {
+impl Query {
     /// Longest time for the answer of what drives the master.
     pub fn limit(&self) -> Duration {
         match self {
-            Ask::Tool(ask) if ask.is_long() => LONG,
+            Query::Tool(ask) if ask.is_long() => LONG,
             _ => USUAL,
         }
     }
@@ -230,22 +230,22 @@ impl Ask {
     /// The right that it needs.
     pub fn right(&self) -> Right {
         match self {
-            Ask::Masters
-            | Ask::State
-            | Ask::Events { .. }
-            | Ask::AlStatus { .. }
-            | Ask::SdoUpload { .. }
-            | Ask::SiiRead { .. }
-            | Ask::Look
-            | Ask::IdnRead { .. } => Right::Read,
-            Ask::RegisterRead { address, length, .. } => right_to_read(*address, *length),
-            Ask::Tool(ask) if ask.is_reading() => Right::Read,
-            Ask::Tool(_)
-            | Ask::SdoDownload { .. }
-            | Ask::RegisterWrite { .. }
-            | Ask::RequestState { .. }
-            | Ask::Rescan
-            | Ask::IdnWrite { .. } => Right::Change,
+            Query::Masters
+            | Query::State
+            | Query::Events { .. }
+            | Query::AlStatus { .. }
+            | Query::SdoUpload { .. }
+            | Query::SiiRead { .. }
+            | Query::Overview
+            | Query::IdnRead { .. } => Right::Read,
+            Query::RegisterRead { address, length, .. } => right_to_read(*address, *length),
+            Query::Tool(ask) if ask.is_reading() => Right::Read,
+            Query::Tool(_)
+            | Query::SdoDownload { .. }
+            | Query::RegisterWrite { .. }
+            | Query::RequestState { .. }
+            | Query::Rescan
+            | Query::IdnWrite { .. } => Right::Change,
         }
     }
 }
@@ -266,11 +266,11 @@ fn right_to_read(address: u16, length: u16) -> Right {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Answer {
-    /// To [`Ask::Masters`].
+    /// To [`Query::Masters`].
     Masters(Vec<MasterState>),
-    /// To [`Ask::State`].
+    /// To [`Query::State`].
     State(Box<Snapshot>),
-    /// To [`Ask::Events`].
+    /// To [`Query::Events`].
     Events {
         /// Identifies the numbering: another epoch means that it began anew.
         epoch: u64,
@@ -281,7 +281,7 @@ pub enum Answer {
         /// Oldest first.
         events: Vec<EventLine>,
     },
-    /// To [`Ask::AlStatus`].
+    /// To [`Query::AlStatus`].
     AlStatus {
         /// Register AL_STATUS: state, error bit 0x10.
         status: u16,
@@ -292,9 +292,9 @@ pub enum Answer {
     Data,
     /// It is done.
     Done,
-    /// To [`Ask::Look`].
-    Look(SegmentLook),
-    /// To [`Ask::Tool`].
+    /// To [`Query::Overview`].
+    Overview(SegmentOverview),
+    /// To [`Query::Tool`].
     Tool(ToolAnswer),
 }
 
@@ -333,7 +333,7 @@ pub struct HandedBus {
     pub interfaces: Vec<String>,
     /// The daemon can switch links ([`Content::SwitchLink`]).
     pub can_switch: bool,
-    /// Level of messages: 0 to 2, above as 2 ([`ToolAsk::SetDebugLevel`]). It outlasts hand-overs.
+    /// Level of messages: 0 to 2, above as 2 ([`ToolQuery::SetDebugLevel`]). It outlasts hand-overs.
     pub debug_level: u32,
 }
 
@@ -379,7 +379,7 @@ mod tests {
     // covers: daemon
     #[test]
     fn to_read_registers_that_reading_changes_needs_the_right_to_change() {
-        let right = |address, length| Ask::RegisterRead { position: 0, address, length }.right();
+        let right = |address, length| Query::RegisterRead { position: 0, address, length }.right();
         for (address, length) in [(0, 1024), (0x0130, 2), (0x0900, 0x8E), (0x0990, 0x1E), (0x09D0, 2), (0x0FFF, 1)] {
             assert_eq!(right(address, length), Right::Read, "{address:#x}, {length}");
         }

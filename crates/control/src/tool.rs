@@ -13,11 +13,11 @@ pub use lines::{
     SubDeviceLine, SyncLine, SyncManagerLine, Traffic, TrafficRate,
 };
 
-/// Most SubDevices in one answer to [`ToolAsk::SubDevices`] and [`ToolAsk::Ports`].
+/// Most SubDevices in one answer to [`ToolQuery::SubDevices`] and [`ToolQuery::Ports`].
 pub const MOST_SUBDEVICES: usize = 512;
-/// Most declared SubDevices in one answer to [`ToolAsk::Declared`].
+/// Most declared SubDevices in one answer to [`ToolQuery::Declared`].
 pub const MOST_DECLARED: usize = 64;
-/// Most bytes of a part of a file, in [`ToolAsk::FilePart`].
+/// Most bytes of a part of a file, in [`ToolQuery::FilePart`].
 pub const MOST_PART: usize = 48 << 10;
 /// Most bytes of a file that is read or written.
 pub const MOST_FILE: usize = 16 << 20;
@@ -27,7 +27,7 @@ pub const MOST_STARTUP: usize = 1024;
 /// A question of the tool.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
-pub enum ToolAsk {
+pub enum ToolQuery {
     /// The master as a whole: links, frames, clocks.
     Master,
     /// SubDevices with their present AL states, from a position on.
@@ -145,25 +145,25 @@ pub enum ToolAsk {
     Ethernet,
 }
 
-impl ToolAsk {
+impl ToolQuery {
     /// Whether the answer only tells what is so.
     pub fn is_reading(&self) -> bool {
         !matches!(
             self,
-            ToolAsk::FilePart { .. }
-                | ToolAsk::FileWrite { .. }
-                | ToolAsk::SiiWrite { .. }
-                | ToolAsk::AliasWrite { .. }
-                | ToolAsk::StartState { .. }
-                | ToolAsk::UrgentWrite { .. }
-                | ToolAsk::SetIp { .. }
-                | ToolAsk::SetDebugLevel { .. }
+            ToolQuery::FilePart { .. }
+                | ToolQuery::FileWrite { .. }
+                | ToolQuery::SiiWrite { .. }
+                | ToolQuery::AliasWrite { .. }
+                | ToolQuery::StartState { .. }
+                | ToolQuery::UrgentWrite { .. }
+                | ToolQuery::SetIp { .. }
+                | ToolQuery::SetDebugLevel { .. }
         )
     }
 
     /// Whether it may take minutes: flash memory is erased and written.
     pub fn is_long(&self) -> bool {
-        matches!(self, ToolAsk::FileRead { .. } | ToolAsk::FileWrite { .. } | ToolAsk::SiiWrite { .. })
+        matches!(self, ToolQuery::FileRead { .. } | ToolQuery::FileWrite { .. } | ToolQuery::SiiWrite { .. })
     }
 }
 
@@ -171,25 +171,25 @@ impl ToolAsk {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum ToolAnswer {
-    /// To [`ToolAsk::Master`].
+    /// To [`ToolQuery::Master`].
     Master(Box<MasterReport>),
-    /// To [`ToolAsk::SubDevices`].
+    /// To [`ToolQuery::SubDevices`].
     SubDevices(Piece<SubDeviceLine>),
-    /// To [`ToolAsk::Description`].
+    /// To [`ToolQuery::Description`].
     Description(Box<Description>),
-    /// To [`ToolAsk::Ports`].
+    /// To [`ToolQuery::Ports`].
     Ports(Piece<PortsLine>),
-    /// To [`ToolAsk::Objects`].
+    /// To [`ToolQuery::Objects`].
     Objects(Vec<u16>),
-    /// To [`ToolAsk::Object`].
+    /// To [`ToolQuery::Object`].
     Object(ObjectLine),
-    /// To [`ToolAsk::Entry`].
+    /// To [`ToolQuery::Entry`].
     Entry(EntryLine),
-    /// To [`ToolAsk::Declared`].
+    /// To [`ToolQuery::Declared`].
     Declared(Piece<DeclaredLine>),
-    /// To [`ToolAsk::Domains`].
+    /// To [`ToolQuery::Domains`].
     Domains(Vec<DomainLine>),
-    /// To [`ToolAsk::Ethernet`].
+    /// To [`ToolQuery::Ethernet`].
     Ethernet(Vec<EthernetLine>),
 }
 

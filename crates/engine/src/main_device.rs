@@ -28,6 +28,8 @@ mod idle;
 mod image_memory;
 #[cfg(feature = "standby")]
 mod listen;
+#[cfg(feature = "standby")]
+mod listener;
 mod live_status;
 mod loaded;
 mod lrw;
@@ -59,6 +61,7 @@ mod steps;
 #[cfg(feature = "standby")]
 mod take_over;
 mod tool;
+mod turns;
 mod working_counters;
 
 use alloc::collections::BTreeMap;
@@ -80,7 +83,7 @@ pub use ethernet::EthernetSubDevice;
 pub use found::DeclaredSubDevice;
 pub use image_memory::ImageMemory;
 #[cfg(feature = "standby")]
-pub use listen::Heard;
+pub use listener::{Heard, Listener};
 pub use live_status::{LiveStatus, LostCopies, SegmentStatus, SubDeviceStatus, WkcShare};
 pub use options::Options;
 pub use pending::Pending;
@@ -365,27 +368,9 @@ impl MainDevice {
         self.supervisor.receive(arrived_on, bytes, now)
     }
 
-    /// Runs procedures whose replies, deadlines or signals have arrived.
-    pub fn poll(&mut self, now: Instant) {
-        self.supervisor.poll(now);
-        #[cfg(feature = "standby")]
-        self.follow_role(now);
-    }
-
     /// Sends acyclic frames within a byte budget; see [`Supervisor::transmit`].
     pub fn transmit(&mut self, now: Instant, budget: usize, transmit: &mut impl FnMut(Link, &[u8])) -> usize {
         self.supervisor.transmit(now, budget, transmit)
-    }
-
-    /// The latest time of the next call of [`MainDevice::poll`].
-    pub fn next_deadline(&self) -> Option<Instant> {
-        self.supervisor.next_deadline()
-    }
-
-    /// When the acyclic half has work; see [`Supervisor::due_at`].
-    #[inline(always)]
-    pub fn due_at(&self) -> Instant {
-        self.supervisor.due_at()
     }
 
     /// Command to the link layer; see [`Supervisor::take_link_order`].

@@ -82,6 +82,15 @@ impl Forwarder {
         self
     }
 
+    /// Whether a received frame is of another MainDevice: one that may be forwarded.
+    pub fn is_of_another(&self, frame: &[u8], now: Instant) -> bool {
+        match self.own.classify(frame) {
+            Classified::Foreign => true,
+            Classified::Ours(_) => self.own_until.is_none_or(|until| now > until),
+            Classified::Other => false,
+        }
+    }
+
     /// Marks a frame that was received on a link as forwarded, and returns the link to send it on. `carriers`: whether
     /// the main and the redundant link are up. The rest of the frame stays as it is, the C bits of its datagrams
     /// included (protocol CF-06).

@@ -5,9 +5,9 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use ringcat_control::client::ClientError;
-use ringcat_control::message::{Answer, Ask, MasterState};
+use ringcat_control::message::{Answer, MasterState, Query};
 use ringcat_control::socket::to_connect_to;
-use ringcat_control::tool::{MOST_SUBDEVICES, Piece, SubDeviceLine, ToolAnswer, ToolAsk};
+use ringcat_control::tool::{MOST_SUBDEVICES, Piece, SubDeviceLine, ToolAnswer, ToolQuery};
 use ringcat_control::{Client, Refusal};
 
 use crate::arguments::Arguments;
@@ -89,7 +89,7 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// The daemon refuses, or is not there.
-    pub fn ask(&mut self, master: u32, ask: Ask, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), Failure> {
+    pub fn ask(&mut self, master: u32, ask: Query, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), Failure> {
         Ok(self.client()?.ask_patiently(master, &ask, &bytes)?)
     }
 
@@ -97,8 +97,8 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// As [`Session::ask`].
-    pub fn tool(&mut self, master: u32, ask: ToolAsk) -> Result<ToolAnswer, Failure> {
-        match self.ask(master, Ask::Tool(ask), Vec::new())? {
+    pub fn tool(&mut self, master: u32, ask: ToolQuery) -> Result<ToolAnswer, Failure> {
+        match self.ask(master, Query::Tool(ask), Vec::new())? {
             (Answer::Tool(answer), _) => Ok(answer),
             _ => Err(unexpected()),
         }
@@ -108,8 +108,8 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// As [`Session::ask`].
-    pub fn done(&mut self, master: u32, ask: ToolAsk, bytes: Vec<u8>) -> Result<Vec<u8>, Failure> {
-        Ok(self.ask(master, Ask::Tool(ask), bytes)?.1)
+    pub fn done(&mut self, master: u32, ask: ToolQuery, bytes: Vec<u8>) -> Result<Vec<u8>, Failure> {
+        Ok(self.ask(master, Query::Tool(ask), bytes)?.1)
     }
 
     /// All masters.
@@ -118,7 +118,7 @@ impl<'a> Session<'a> {
     /// There is no daemon.
     pub fn all_masters(&mut self) -> Result<Vec<MasterState>, Failure> {
         let explicit = self.list(self.arguments.master.as_deref(), "master")?.single();
-        let asked = self.ask(0, Ask::Masters, Vec::new());
+        let asked = self.ask(0, Query::Masters, Vec::new());
         let failed = |text: String| match explicit {
             Some(number) => Failure::failed(format!("Failed to open master {number}: {text}")),
             None => Failure::failed(format!("Failed to obtain number of masters: {text}")),
@@ -192,7 +192,7 @@ impl<'a> Session<'a> {
         let mut lines: Vec<SubDeviceLine> = Vec::new();
         loop {
             let from = u16::try_from(lines.len()).unwrap_or(u16::MAX);
-            let answer = self.tool(master, ToolAsk::SubDevices { from })?;
+            let answer = self.tool(master, ToolQuery::SubDevices { from })?;
             let ToolAnswer::SubDevices(Piece { total, these }) = answer else { return Err(unexpected()) };
             let is_last = these.len() < MOST_SUBDEVICES;
             lines.extend(these);

@@ -2,7 +2,7 @@
 //!
 //! A bus has its links and the thread of the acyclic half, which scans and keeps all SubDevices in PREOP while no
 //! application is active. One handle reserves it. Where a daemon answers, it comes from there when a handle reserves
-//! it, and goes back with that handle; others ask the daemon ([`crate::door`]).
+//! it, and goes back with that handle; others ask the daemon ([`crate::responder`]).
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,10 +14,10 @@ use ringcat::{Options, Retries, SubDeviceInfo, SupervisorThread, realtime};
 
 use crate::any_links::{self, AnyLinks};
 use crate::code::{Code, Outcome, report, report_as};
-use crate::door::{DaemonDoor, Door, code_of};
 use crate::environment::{program_name, source};
 use crate::host::{HeldSignals, generation, memory_hint, variable};
 use crate::locks::locked;
+use crate::responder::{DaemonResponder, Responder, code_of};
 
 /// Longest wait of a request for the scan.
 const READY_LIMIT: Duration = Duration::from_secs(20);
@@ -44,7 +44,7 @@ pub struct Bus {
     _owned: Mutex<Option<OwnedBus>>,
     /// Of a bus from a daemon.
     ownership: Option<OwnershipWatch>,
-    door: Arc<Door>,
+    responder: Arc<Responder>,
     is_reserved: AtomicBool,
 }
 
@@ -100,12 +100,12 @@ impl Bus {
     ///
     /// # Errors
     /// Another handle or process drives it, or this user may not. The reason was reported.
-    pub fn take(door: &DaemonDoor) -> Outcome<Arc<Bus>> {
+    pub fn take(responder: &DaemonResponder) -> Outcome<Arc<Bus>> {
         let begin = Instant::now();
         let bus = loop {
             let mut buses = locked(&BUSES);
             buses.retain(|bus| bus.strong_count() > 0);
-            match Bus::of_daemon(door.socket(), door.master()) {
+            match Bus::of_daemon(responder.socket(), responder.master()) {
                 Ok(bus) => {
                     let bus = Arc::new(bus);
                     buses.push(Arc::downgrade(&bus));
@@ -165,9 +165,9 @@ impl Bus {
         let _log = log.map_err(|error| format!("a thread cannot be started: {error}{}", memory_hint()))?;
         let cyclic_links = Mutex::new(Some(cyclic));
         let generation = generation();
-        let (door, is_reserved) = (Arc::new(Door::Here(supervisor.clone())), AtomicBool::new(false));
+        let (responder, is_reserved) = (Arc::new(Responder::Here(supervisor.clone())), AtomicBool::new(false));
         let _owned = Mutex::new(owned);
-        Ok(Bus { master, generation, _log, supervisor, cyclic_links, _owned, ownership, door, is_reserved })
+        Ok(Bus { master, generation, _log, supervisor, cyclic_links, _owned, ownership, responder, is_reserved })
     }
 
     /// Number of the master.
@@ -230,8 +230,8 @@ impl Bus {
     }
 
     /// Where questions are answered.
-    pub fn door(&self) -> Arc<Door> {
-        self.door.clone()
+    pub fn responder(&self) -> Arc<Responder> {
+        self.responder.clone()
     }
 
     /// Waits until the scan has ended and the PDOs of the dictionaries are known. SubDevices that are not in PREOP yet
@@ -240,7 +240,7 @@ impl Bus {
     pub fn wait_until_scanned(&self) {
         let begin = Instant::now();
         loop {
-            let Ok(seen) = self.door.look() else { return };
+            let Ok(seen) = self.responder.overview() else { return };
             let (responding, found) = (seen.responding(), seen.found);
             let is_found = seen.is_scanned && found == u32::from(responding) && found > 0;
             if is_found && !self.supervisor.with(|engine| engine.are_pdos_awaited()).unwrap_or(false) {

@@ -2,11 +2,11 @@
 
 use std::ffi::c_char;
 
-use ringcat::daemon::known::{Description, PdoLine, PortLine, SyncManagerLine, ToolAnswer, ToolAsk};
-use ringcat::daemon::{Answer, Ask};
+use ringcat::daemon::known::{Description, PdoLine, PortLine, SyncManagerLine, ToolAnswer, ToolQuery};
+use ringcat::daemon::{Answer, Query};
 
 use crate::code::{Code, Outcome};
-use crate::door::{Door, code_of};
+use crate::responder::{Responder, code_of};
 use crate::types::{MasterInfo, PdoEntryInfo, PdoInfo, Port, ScanProgress, SlaveInfo, SyncInfo};
 
 /// No SubDevice behind a port.
@@ -21,8 +21,8 @@ const ERROR: u16 = 0x10;
 ///
 /// # Errors
 /// The bus does not answer.
-pub fn master(door: &Door, app_time: u64) -> Outcome<MasterInfo> {
-    let seen = door.look()?;
+pub fn master(responder: &Responder, app_time: u64) -> Outcome<MasterInfo> {
+    let seen = responder.overview()?;
     Ok(MasterInfo {
         slave_count: seen.found,
         link_up: seen.is_up.contains(&true).into(),
@@ -36,35 +36,35 @@ pub fn master(door: &Door, app_time: u64) -> Outcome<MasterInfo> {
 ///
 /// # Errors
 /// The bus does not answer.
-pub fn scan_progress(door: &Door) -> Outcome<ScanProgress> {
-    let seen = door.look()?;
+pub fn scan_progress(responder: &Responder) -> Outcome<ScanProgress> {
+    let seen = responder.overview()?;
     Ok(match seen.is_scanned {
         true => ScanProgress { slave_count: seen.found, scan_index: seen.found },
         false => ScanProgress { slave_count: seen.responding().into(), scan_index: 0 },
     })
 }
 
-fn ask(door: &Door, what: Ask) -> Outcome<Answer> {
-    door.ask(what, Vec::new()).map(|(answer, _)| answer).map_err(|refusal| code_of(&refusal))
+fn ask(responder: &Responder, what: Query) -> Outcome<Answer> {
+    responder.ask(what, Vec::new()).map(|(answer, _)| answer).map_err(|refusal| code_of(&refusal))
 }
 
-fn told(door: &Door, what: ToolAsk) -> Outcome<ToolAnswer> {
-    match ask(door, Ask::Tool(what))? {
+fn tool_answer(responder: &Responder, what: ToolQuery) -> Outcome<ToolAnswer> {
+    match ask(responder, Query::Tool(what))? {
         Answer::Tool(answer) => Ok(answer),
         _ => Err(Code::IO),
     }
 }
 
-fn description(door: &Door, position: u16) -> Outcome<Description> {
-    match told(door, ToolAsk::Description { position })? {
+fn description(responder: &Responder, position: u16) -> Outcome<Description> {
+    match tool_answer(responder, ToolQuery::Description { position })? {
         ToolAnswer::Description(description) => Ok(*description),
         _ => Err(Code::IO),
     }
 }
 
 /// What is behind its ports; nothing if there is no report of it.
-fn ports(door: &Door, position: u16) -> [PortLine; 4] {
-    match told(door, ToolAsk::Ports { from: position, most: 1 }) {
+fn ports(responder: &Responder, position: u16) -> [PortLine; 4] {
+    match tool_answer(responder, ToolQuery::Ports { from: position, most: 1 }) {
         Ok(ToolAnswer::Ports(piece)) => {
             let own = piece.these.iter().find(|line| line.position == position);
             own.map(|line| line.ports).unwrap_or_default()
@@ -77,14 +77,14 @@ fn ports(door: &Door, position: u16) -> [PortLine; 4] {
 ///
 /// # Errors
 /// No such SubDevice.
-pub fn slave(door: &Door, position: u16) -> Outcome<SlaveInfo> {
-    let description = description(door, position)?;
-    let ports = ports(door, position);
-    let status = match ask(door, Ask::AlStatus { position }) {
+pub fn slave(responder: &Responder, position: u16) -> Outcome<SlaveInfo> {
+    let description = description(responder, position)?;
+    let ports = ports(responder, position);
+    let status = match ask(responder, Query::AlStatus { position }) {
         Ok(Answer::AlStatus { status, .. }) => Some(status),
         _ => None,
     };
-    let sdo_count = match told(door, ToolAsk::Objects { position }) {
+    let sdo_count = match tool_answer(responder, ToolQuery::Objects { position }) {
         Ok(ToolAnswer::Objects(indices)) => u16::try_from(indices.len()).unwrap_or(u16::MAX),
         _ => 0,
     };
@@ -128,8 +128,8 @@ fn manager(description: &Description, index: u8) -> Outcome<&SyncManagerLine> {
 ///
 /// # Errors
 /// No such SubDevice or SyncManager.
-pub fn sync_manager(door: &Door, position: u16, index: u8) -> Outcome<SyncInfo> {
-    let description = description(door, position)?;
+pub fn sync_manager(responder: &Responder, position: u16, index: u8) -> Outcome<SyncInfo> {
+    let description = description(responder, position)?;
     let own = manager(&description, index)?;
     Ok(SyncInfo {
         index,
@@ -149,8 +149,8 @@ fn assigned(description: &Description, index: u8, pdo: u16) -> Outcome<&PdoLine>
 ///
 /// # Errors
 /// No such SubDevice, SyncManager or PDO.
-pub fn pdo(door: &Door, position: u16, index: u8, pdo: u16) -> Outcome<PdoInfo> {
-    let description = description(door, position)?;
+pub fn pdo(responder: &Responder, position: u16, index: u8, pdo: u16) -> Outcome<PdoInfo> {
+    let description = description(responder, position)?;
     let found = assigned(&description, index, pdo)?;
     Ok(PdoInfo { index: found.index, n_entries: found.entries.len() as u32, entries: std::ptr::null() })
 }
@@ -159,8 +159,8 @@ pub fn pdo(door: &Door, position: u16, index: u8, pdo: u16) -> Outcome<PdoInfo> 
 ///
 /// # Errors
 /// No such SubDevice, SyncManager, PDO or entry.
-pub fn entry(door: &Door, position: u16, index: u8, pdo: u16, entry: u16) -> Outcome<PdoEntryInfo> {
-    let description = description(door, position)?;
+pub fn entry(responder: &Responder, position: u16, index: u8, pdo: u16, entry: u16) -> Outcome<PdoEntryInfo> {
+    let description = description(responder, position)?;
     let found = assigned(&description, index, pdo)?.entries.get(usize::from(entry)).ok_or(Code::INVALID)?;
     Ok(PdoEntryInfo { index: found.index, subindex: found.sub_index, bit_length: found.bits })
 }

@@ -6,7 +6,7 @@
 //! |---|---|
 //! | return codes, lines for the operator, structures of C | `code`, `types` |
 //! | links from the environment; the buses of this process | `environment`, `any_links`, `bus` |
-//! | questions, answered here or through a daemon | `door` |
+//! | questions, answered here or through a daemon | `responder` |
 //! | mutexes outside of the cyclic path | `locks` |
 //! | settings of a SubDevice, the declaration under construction | `settings`, `draft` |
 //! | a handle of a master: reservation, activation, cyclic calls | `master`, `active`, `claim`, `domain_words` |
@@ -24,7 +24,6 @@ mod c;
 mod claim;
 mod code;
 mod domain_words;
-mod door;
 mod draft;
 mod environment;
 mod host;
@@ -33,5 +32,6 @@ mod locks;
 mod mailbox;
 mod master;
 mod request;
+mod responder;
 mod settings;
 mod types;

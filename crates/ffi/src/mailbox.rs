@@ -1,9 +1,9 @@
 //! Blocking transfers: objects and IDNs of a SubDevice by its position.
 
-use ringcat::daemon::{Ask, Refusal, ServiceFault};
+use ringcat::daemon::{Query, Refusal, ServiceFault};
 
 use crate::code::{Code, report};
-use crate::door::{Door, code_of};
+use crate::responder::{Responder, code_of};
 
 /// A failed transfer: the code, and the abort code of the SubDevice if it aborted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,44 +18,44 @@ pub struct Failed {
 ///
 /// # Errors
 /// No such SubDevice, it aborted, or did not answer.
-pub fn upload(door: &Door, position: u16, index: u16, sub_index: u8) -> Result<Vec<u8>, Failed> {
-    transfer(door, Ask::SdoUpload { position, index, sub_index: Some(sub_index) }, Vec::new())
+pub fn upload(responder: &Responder, position: u16, index: u16, sub_index: u8) -> Result<Vec<u8>, Failed> {
+    transfer(responder, Query::SdoUpload { position, index, sub_index: Some(sub_index) }, Vec::new())
 }
 
 /// Writes an entry; without a sub-index a whole object.
 ///
 /// # Errors
 /// As [`upload`]; no data.
-pub fn download(door: &Door, position: u16, object: (u16, Option<u8>), data: Vec<u8>) -> Result<(), Failed> {
+pub fn download(responder: &Responder, position: u16, object: (u16, Option<u8>), data: Vec<u8>) -> Result<(), Failed> {
     let (index, sub_index) = object;
-    write(door, Ask::SdoDownload { position, index, sub_index }, data)
+    write(responder, Query::SdoDownload { position, index, sub_index }, data)
 }
 
 /// Reads the value of an IDN.
 ///
 /// # Errors
 /// As [`upload`]; a drive above 7.
-pub fn read_idn(door: &Door, position: u16, drive: u8, idn: u16) -> Result<Vec<u8>, Failed> {
-    transfer(door, Ask::IdnRead { position, drive, idn }, Vec::new())
+pub fn read_idn(responder: &Responder, position: u16, drive: u8, idn: u16) -> Result<Vec<u8>, Failed> {
+    transfer(responder, Query::IdnRead { position, drive, idn }, Vec::new())
 }
 
 /// Writes the value of an IDN.
 ///
 /// # Errors
 /// As [`read_idn`]; no data.
-pub fn write_idn(door: &Door, position: u16, drive: u8, idn: u16, data: Vec<u8>) -> Result<(), Failed> {
-    write(door, Ask::IdnWrite { position, drive, idn }, data)
+pub fn write_idn(responder: &Responder, position: u16, drive: u8, idn: u16, data: Vec<u8>) -> Result<(), Failed> {
+    write(responder, Query::IdnWrite { position, drive, idn }, data)
 }
 
-fn write(door: &Door, what: Ask, data: Vec<u8>) -> Result<(), Failed> {
+fn write(responder: &Responder, what: Query, data: Vec<u8>) -> Result<(), Failed> {
     if data.is_empty() {
         return Err(Failed { code: Code::INVALID, reason: None });
     }
-    transfer(door, what, data).map(|_| ())
+    transfer(responder, what, data).map(|_| ())
 }
 
-fn transfer(door: &Door, what: Ask, data: Vec<u8>) -> Result<Vec<u8>, Failed> {
-    door.ask(what, data).map(|(_, read)| read).map_err(|refusal| {
+fn transfer(responder: &Responder, what: Query, data: Vec<u8>) -> Result<Vec<u8>, Failed> {
+    responder.ask(what, data).map(|(_, read)| read).map_err(|refusal| {
         report(format_args!("{refusal}"));
         let reason = match refusal {
             Refusal::Service { fault: ServiceFault::Aborted(code), .. } => Some(code),

@@ -16,11 +16,11 @@ use crate::active::{Active, Slot};
 use crate::bus::Bus;
 use crate::claim::Claim;
 use crate::code::{Code, Outcome, report};
-use crate::door::{DaemonDoor, Door};
 use crate::draft::Draft;
 use crate::environment::socket;
 use crate::host::{check_memory, variable, watch_forks};
 use crate::locks::locked;
+use crate::responder::{DaemonResponder, Responder};
 use crate::types::SegmentState;
 
 /// Limit of the way to PREOP at the end of an application.
@@ -36,7 +36,7 @@ enum Access {
     /// The bus: this process has opened the links, or a daemon has handed them over to this handle.
     Bus(Arc<Bus>),
     /// Questions to a daemon.
-    Daemon(Arc<Door>),
+    Daemon(Arc<Responder>),
     /// Nothing: it was released.
     Released,
 }
@@ -46,10 +46,10 @@ enum Access {
 ///
 /// # Errors
 /// The daemon does not answer, or has no such master.
-fn ask_daemon(index: u32) -> Result<Option<DaemonDoor>, String> {
+fn ask_daemon(index: u32) -> Result<Option<DaemonResponder>, String> {
     let Some(socket) = socket(index, variable) else { return Ok(None) };
-    match DaemonDoor::open(&socket, index) {
-        Ok(door) => Ok(Some(door)),
+    match DaemonResponder::open(&socket, index) {
+        Ok(responder) => Ok(Some(responder)),
         Err(ClientError::NoDaemon { .. }) if variable("RINGCAT_SOCKET").is_none() => Ok(None),
         Err(error) => Err(error.to_string()),
     }
@@ -85,7 +85,7 @@ impl Master {
         watch_forks();
         check_memory()?;
         let access = match ask_daemon(index)? {
-            Some(door) => Access::Daemon(Arc::new(Door::Daemon(door))),
+            Some(responder) => Access::Daemon(Arc::new(Responder::Daemon(responder))),
             None => Access::Bus(Bus::open(index)?),
         };
         Ok(Master {
@@ -119,10 +119,10 @@ impl Master {
     ///
     /// # Errors
     /// It was released, or the daemon has taken the bus back.
-    pub fn door(&self) -> Outcome<Arc<Door>> {
+    pub fn responder(&self) -> Outcome<Arc<Responder>> {
         match &*locked(&self.access) {
-            Access::Bus(bus) => bus.check_held().map(|()| bus.door()),
-            Access::Daemon(door) => Ok(door.clone()),
+            Access::Bus(bus) => bus.check_held().map(|()| bus.responder()),
+            Access::Daemon(responder) => Ok(responder.clone()),
             Access::Released => Err(Code::INVALID),
         }
     }
@@ -144,9 +144,9 @@ impl Master {
     fn take(&self) -> Outcome<Arc<Bus>> {
         let mut access = locked(&self.access);
         let taken = match &*access {
-            Access::Daemon(door) => match &**door {
-                Door::Daemon(door) => Bus::take(door)?,
-                Door::Here(_) => return Err(Code::INVALID),
+            Access::Daemon(responder) => match &**responder {
+                Responder::Daemon(responder) => Bus::take(responder)?,
+                Responder::Here(_) => return Err(Code::INVALID),
             },
             Access::Bus(bus) => return Ok(bus.clone()),
             Access::Released => return Err(Code::INVALID),
@@ -382,7 +382,7 @@ impl Master {
                 }
             });
         }
-        let seen = self.door()?.look()?;
+        let seen = self.responder()?.overview()?;
         if link == Some(Link::Redundant) && !seen.is_ring {
             return Err(Code::INVALID);
         }

@@ -64,7 +64,8 @@ pub struct Application<L, H = Inline> {
 impl<L: Links, H: AcyclicHalf> Application<L, H> {
     pub(crate) fn new(links: L, mut acyclic: H, active: Active, window: Arc<Window>) -> Application<L, H> {
         let live_status = active.live_status.clone();
-        let cyclic = Cyclic::new(active, window.clone(), links.now());
+        let mut cyclic = Cyclic::new(active, window.clone(), links.now());
+        cyclic.set_up_of_two(&links);
         let samples = cyclic.observed.samples();
         acyclic.sample_each_second(move |now, counters| samples.take(now, counters));
         Application { links, cyclic, acyclic, window, live_status }
@@ -218,6 +219,9 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// Takes all frames that have arrived.
     #[inline(always)]
     fn take_in<P: CycleProbe>(&mut self, now: Instant, probe: &mut P) {
+        if self.cyclic.exchange.is_inactive() {
+            return self.cyclic.pass_on(&mut self.links);
+        }
         let mut awaits_frames = P::AWAITS_FRAMES && self.cyclic.exchange.awaits_frames();
         loop {
             let mut lap = Lap::begin::<P>(|| self.links.now());

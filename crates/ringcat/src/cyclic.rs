@@ -3,11 +3,17 @@
 //! Nothing here waits, allocates or locks. Functions that each cycle calls are inlined on purpose: the calls alone
 //! would take a tenth of a cycle's instructions (bin `socket_cycle`).
 
+#[cfg(not(feature = "standby"))]
+mod alone;
+mod by_hand;
+#[cfg(feature = "standby")]
+mod of_two;
+
 use std::sync::Arc;
 use std::time::Duration;
 
 use ringcat_engine::Follower;
-use ringcat_engine::domain::{DomainId, DomainStatus};
+use ringcat_engine::domain::DomainId;
 use ringcat_engine::exchange::{CopyError, CopyRule, Exchange, Received};
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{Active, Directory};
@@ -16,6 +22,7 @@ use ringcat_engine::time::Instant;
 use crate::cyclic_status::CyclicStatus;
 use crate::links::Links;
 use crate::observer::Observed;
+use crate::of_two::OfTwo;
 use crate::pace::{PaceNs, Trigger};
 use crate::probe::{CycleJob, CycleProbe, Lap};
 use crate::process_data::{ProcessData, Rate};
@@ -39,6 +46,7 @@ enum States {
     Wanted,
 }
 
+/// The cyclic half.
 #[derive(Debug)]
 pub(crate) struct Cyclic {
     pub exchange: Exchange,
@@ -74,6 +82,8 @@ pub(crate) struct Cyclic {
     /// Number of disturbances that the cyclic status includes.
     published: u64,
     states: States,
+    /// Its part in a ring of two MainDevices.
+    pub of_two: OfTwo,
 }
 
 impl Cyclic {
@@ -110,6 +120,7 @@ impl Cyclic {
             held: false,
             window,
             published: 0,
+            of_two: OfTwo::default(),
         }
     }
 
@@ -210,7 +221,9 @@ impl Cyclic {
     #[inline(always)]
     pub fn begin(&mut self, now: Instant, looked_at: Instant) {
         self.begun_at = now;
-        self.keep_pace(now);
+        if !self.begin_of_two(now) {
+            self.keep_pace(now);
+        }
         match self.states {
             States::Settled if self.exchange.process_unchanged() => {}
             States::Wanted => self.process_and_show(looked_at),
@@ -431,34 +444,6 @@ impl Cyclic {
         self.window.expect_cycle(next);
         self.cyclic_status.publish_spread(self.exchange.clock_spread_ns());
         self.cyclic_status.publish_ring(self.exchange.ring());
-    }
-
-    /// Evaluates a domain, for an application with its own loop.
-    pub fn process(&mut self, domain: DomainId, now: Instant) -> DomainStatus {
-        let status = self.exchange.process(domain, now);
-        if let Some(rate) = self.rates.get_mut(domain.0) {
-            rate.status = status;
-        }
-        let is_wanted = self.states == States::Wanted;
-        self.note_states();
-        if is_wanted {
-            self.observed.fill(self.cycle, now, &self.exchange, &self.rates);
-        }
-        status
-    }
-
-    /// Sends the queued frames, for an application with its own loop: the next cycle is expected one period later.
-    pub fn send_by_hand(&mut self, now: Instant, links: &mut impl Links) {
-        if self.states == States::Wanted {
-            // No domain was processed since the request.
-            self.states = States::Changing;
-            self.observed.fill(self.cycle, now, &self.exchange, &self.rates);
-        }
-        self.pace.cycles += 1;
-        self.next_cycle = Instant(now.0.saturating_add(self.period_ns));
-        self.earliest = self.next_cycle;
-        self.send(now, self.next_cycle, links);
-        self.publish();
     }
 
     #[inline(always)]

@@ -47,6 +47,9 @@ pub enum Error {
     Write(WriteError),
     /// The declaration has no such domain.
     NoDomain(NoDomain),
+    /// One of two MainDevices needs a redundant link.
+    #[cfg(feature = "standby")]
+    NeedsTwoLinks(crate::standby::NeedsTwoLinks),
     /// A service did not end in time.
     TimedOut {
         /// The limit.
@@ -88,6 +91,8 @@ impl fmt::Display for Error {
             Error::DoesNotFit(error) => error.fmt(f),
             Error::Write(error) => error.fmt(f),
             Error::NoDomain(error) => error.fmt(f),
+            #[cfg(feature = "standby")]
+            Error::NeedsTwoLinks(error) => error.fmt(f),
             Error::TimedOut { limit } => write!(f, "not done within {} ms", limit.as_millis()),
             Error::Stop(error @ StopError::Bus(BusError::Lost { .. })) => write!(
                 f,
@@ -124,6 +129,8 @@ impl std::error::Error for Error {
             Error::Stop(error) => Some(error),
             #[cfg(feature = "sim")]
             Error::Segment(error) => Some(error),
+            #[cfg(feature = "standby")]
+            Error::NeedsTwoLinks(error) => Some(error),
             Error::Thread(error) => Some(error),
             #[cfg(feature = "gateway")]
             Error::Gateway { cause, .. } => Some(cause),
@@ -155,6 +162,13 @@ errors! {
     Write(WriteError),
     NoDomain(NoDomain),
     Stop(StopError),
+}
+
+#[cfg(feature = "standby")]
+impl From<crate::standby::NeedsTwoLinks> for Error {
+    fn from(error: crate::standby::NeedsTwoLinks) -> Error {
+        Error::NeedsTwoLinks(error)
+    }
 }
 
 impl From<SubDeviceError> for Error {

@@ -51,7 +51,7 @@
 //! | `eoe` | network interfaces of the host for SubDevices that support Ethernet over EtherCAT |
 //! | `daemon` | applications get their bus from the daemon `ringcatd` |
 //! | `serde` | the types of `Snapshot` in any format of serde |
-//! | `standby` | an INACTIVE MainDevice of a ring of two, which forwards ([`standby::StoreAndForward`]) |
+//! | `standby` | one of two MainDevices in a ring, which forwards, follows and takes over ([`MainDevice::join`]) |
 //! | `tracing` | events and messages of the acyclic half for a `tracing` subscriber |
 //!
 //! Without these features an application implements [`Links`] itself.
@@ -92,6 +92,12 @@ pub mod network;
 mod no_domain;
 mod not_ready;
 mod observer;
+#[cfg(not(feature = "standby"))]
+#[path = "alone.rs"]
+mod of_two;
+#[cfg(feature = "standby")]
+mod of_two;
+mod options;
 mod pace;
 #[cfg(feature = "packet")]
 pub mod packet;

@@ -6,13 +6,17 @@
 //! frame on at the other link, or back if that one is down, so that the ACTIVE has its ring. Frames of any MainDevice
 //! that leaves two bits of its source address to the standby are forwarded (protocol 9.7.1).
 //!
-//! An INACTIVE that follows, takes over and hands its role over is an [`Engine`](crate::Engine) with
-//! [`EngineOptions::standby`], and the [`Exchange`](crate::Exchange) of its application. The application drives both,
-//! and a [`Forwarder`], as `docs/standby.md` describes; the threads and the cycles of
-//! [`MainDevice`](crate::MainDevice) do not do this yet.
+//! A [`MainDevice`](crate::MainDevice) with [`Options::standby`](crate::Options::standby) is one of both:
+//! [`MainDevice::join`](crate::MainDevice::join) forwards and listens, and returns an application that follows the
+//! ACTIVE, or is ACTIVE itself. A [`Policy`] decides when it takes over; [`RoleControl`] requests a role from any
+//! thread. Below that are an [`Engine`](crate::Engine) with [`EngineOptions::standby`] and the
+//! [`Exchange`](crate::Exchange) of its application, which `docs/standby.md` describes.
 
 #[cfg(feature = "packet")]
 pub mod guard;
+mod joining;
+pub(crate) mod policy;
+mod roles;
 
 use std::error::Error;
 use std::fmt;
@@ -21,7 +25,7 @@ use std::time::Duration;
 pub use ringcat_engine::event::StandbyEvent;
 pub use ringcat_engine::layout::MasterSizes;
 use ringcat_engine::link::Link;
-pub use ringcat_engine::main_device::{Active, Heard, Options as EngineOptions, StandbyOptions};
+pub use ringcat_engine::main_device::{Active, Heard, Listener, Options as EngineOptions, StandbyOptions};
 pub use ringcat_engine::role::{Partner, RoleCause, RoleControl, RoleRequest};
 pub use ringcat_engine::standby::{Forwarder, NotForwarded, Onward};
 use ringcat_engine::time::Instant;
@@ -29,12 +33,33 @@ pub use ringcat_engine::{Class, class_of};
 use ringcat_wire::frame::MacAddress;
 pub use ringcat_wire::master_frame::{NotReady, Stage};
 
+pub use self::joining::{Joining, Next};
+pub use self::policy::{OnCollision, Policy};
 use crate::links::{Arrived, Links, PerLink, SendOn};
 
 /// Most frames that one call of [`StoreAndForward::forward`] takes.
 pub const MAX_AT_ONCE: usize = 256;
 /// Default age from which frames are not forwarded: an ACTIVE MainDevice has given them up.
 pub const MAX_AGE: Duration = Duration::from_millis(5);
+
+/// What takes and fills frames that are forwarded.
+pub(crate) trait Reads {
+    /// A frame of another MainDevice, before it is sent on.
+    fn before(&mut self, link: Link, frame: &mut [u8], at: Instant);
+
+    /// The same after it was sent on.
+    fn after(&mut self, _frame: &[u8]) {}
+
+    /// Whether a link has a carrier, as far as this knows.
+    fn is_up(&self, _link: Link) -> bool {
+        true
+    }
+}
+
+/// Frames are only forwarded.
+impl Reads for () {
+    fn before(&mut self, _link: Link, _frame: &mut [u8], _at: Instant) {}
+}
 
 /// Forwards the frames of an ACTIVE MainDevice.
 #[derive(Debug)]
@@ -108,27 +133,43 @@ impl StoreAndForward {
         self
     }
 
+    /// From now on: this MainDevice was ACTIVE, and has sent its last frame at this time.
+    pub(crate) fn note_sent(&mut self, last_sent: Instant) {
+        self.forwarder = self.forwarder.after_sending(last_sent);
+    }
+
     /// Forwards the frames that have arrived, at most [`MAX_AT_ONCE`]; the number of frames taken. Neither allocates
     /// nor waits.
     pub fn forward(&mut self, links: &mut impl Links) -> usize {
+        self.forward_and_read(links, &mut ())
+    }
+
+    /// The same, and reads the frames.
+    pub(crate) fn forward_and_read(&mut self, links: &mut impl Links, reader: &mut impl Reads) -> usize {
         for taken in 0..MAX_AT_ONCE {
             let now = links.now();
             let since = Instant(now.0.saturating_sub(u64::try_from(self.max_age.as_nanos()).unwrap_or(u64::MAX)));
-            if !links.receive_and_pass(since, &mut |arrived, links| self.pass_on(arrived, links, since, now)) {
+            let mut pass = |arrived: Arrived<'_>, links: &mut dyn SendOn| {
+                if arrived.at < since {
+                    self.counters.too_old += 1;
+                } else {
+                    self.pass_on(arrived, links, reader, now);
+                }
+            };
+            if !links.receive_and_pass(since, &mut pass) {
                 return taken;
             }
         }
         MAX_AT_ONCE
     }
 
-    /// Sends a frame on, unless it arrived before `since`.
-    fn pass_on(&mut self, arrived: Arrived<'_>, links: &mut dyn SendOn, since: Instant, now: Instant) {
+    /// Sends a frame on.
+    fn pass_on(&mut self, arrived: Arrived<'_>, links: &mut dyn SendOn, reader: &mut impl Reads, now: Instant) {
         let Arrived { link: received_on, at, frame } = arrived;
-        if at < since {
-            self.counters.too_old += 1;
-            return;
+        let carriers = Link::ALL.map(|link| links.is_up(link) && reader.is_up(link));
+        if self.forwarder.is_of_another(frame, now) {
+            reader.before(received_on, frame, at.min(now));
         }
-        let carriers = Link::ALL.map(|link| links.is_up(link));
         let forwarder = self.forwarder;
         let passed = forwarder.forward(frame, received_on, carriers, now).and_then(|onward| {
             if links.send(onward.link, frame) {
@@ -137,6 +178,9 @@ impl StoreAndForward {
             let back = forwarder.turn_back(frame, received_on, onward)?;
             if links.send(back.link, frame) { Ok(back) } else { Err(NotForwarded::NoLink) }
         });
+        if passed.is_ok() {
+            reader.after(frame);
+        }
         self.count(passed, received_on);
     }
 

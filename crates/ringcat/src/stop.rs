@@ -34,7 +34,8 @@ impl<L: Links> Application<L, Inline> {
     pub fn stop(mut self, outputs: LastOutputs, state: AlState, limit: Duration) -> Result<MainDevice<L>, Error> {
         self.end_cycles(outputs, is_allowed(&self.acyclic.engine, Function::Stop));
         self.acyclic.engine.start_stop(state, limit, self.links.now());
-        let mut main_device = MainDevice::from_parts(self.links, self.acyclic.engine, self.window.budget());
+        let (budget, of_two) = (self.window.budget(), self.cyclic.of_two);
+        let mut main_device = MainDevice::from_parts(self.links, self.acyclic.engine, budget, of_two);
         main_device.finish_stop()?;
         Ok(main_device)
     }
@@ -53,7 +54,8 @@ impl<L: Links> Application<L, Inline> {
     ) -> Result<MainDevice<L>, Box<Refused<MainDevice<L>>>> {
         self.end_cycles(outputs, is_allowed(&self.acyclic.engine, Function::Deactivate));
         let begun = self.acyclic.engine.start_deactivate(limit, self.links.now()).map_err(Error::from);
-        let mut main_device = MainDevice::from_parts(self.links, self.acyclic.engine, self.window.budget());
+        let (budget, of_two) = (self.window.budget(), self.cyclic.of_two);
+        let mut main_device = MainDevice::from_parts(self.links, self.acyclic.engine, budget, of_two);
         match begun.and_then(|()| main_device.finish_stop()) {
             Ok(()) => Ok(main_device),
             Err(error) => Err(Box::new(Refused { error, main_device })),

@@ -6,6 +6,8 @@
 //! only runs its cycles.
 
 mod handover;
+#[cfg(feature = "standby")]
+mod joining;
 mod looking;
 mod worker;
 
@@ -106,7 +108,8 @@ impl SupervisorThread {
             // The engine is created in this thread, because its procedures cannot move to another one.
             let mut engine = options.engine(&links);
             begin(&mut engine);
-            Worker::new(links, engine, windows, outgoing, shared).run(&incoming);
+            let of_two = options.of_two(&links);
+            Worker::new(links, (engine, of_two), windows, outgoing, shared).run(&incoming);
         };
         let builder = std::thread::Builder::new().name("supervisor".into()).stack_size(STACK_BYTES);
         let thread = builder.spawn(body).map_err(Error::Thread)?;

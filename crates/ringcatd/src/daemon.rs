@@ -46,8 +46,8 @@ impl Daemon {
     }
 
     /// Tries again what was not possible before; to be called about each second.
-    pub fn look_after(&self) {
-        self.masters.all.iter().for_each(Master::look_after);
+    pub fn supervise(&self) {
+        self.masters.all.iter().for_each(Master::supervise);
     }
 
     /// The masters.

@@ -135,7 +135,7 @@ impl Driving {
 fn wait_until_settled(supervisor: &SupervisorThread) {
     let settled = AlState::PreOp.code();
     let (begin, mut last, mut since) = (Instant::now(), 0, Instant::now());
-    while let Ok(seen) = serving::look(supervisor) {
+    while let Ok(seen) = serving::overview(supervisor) {
         if seen.al_states != last {
             (last, since) = (seen.al_states, Instant::now());
         }

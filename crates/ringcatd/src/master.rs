@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use ringcat::daemon::{Lines, serving};
 use ringcat::{AlState, Handover, Knowledge};
-use ringcat_control::message::{Answer, Ask, HandedBus, MasterState, ToolAnswer, ToolAsk};
+use ringcat_control::message::{Answer, HandedBus, MasterState, Query, ToolAnswer, ToolQuery};
 use ringcat_control::{Content, Message, Refusal};
 use ringcat_link::TapInterface;
 
@@ -83,7 +83,7 @@ pub enum End {
 }
 
 /// The time of an owner. It ends by [`Tenancy::end`]; if the thread that watches it fails before, nothing drives the
-/// master until the next [`Master::look_after`].
+/// master until the next [`Master::supervise`].
 #[derive(Debug)]
 #[must_use]
 pub struct Tenancy<'a> {
@@ -119,7 +119,7 @@ impl Master {
         Master::start(Settings::new(number, links), wires)
     }
 
-    /// The same with settings. Links that cannot be opened are tried again by [`Master::look_after`].
+    /// The same with settings. Links that cannot be opened are tried again by [`Master::supervise`].
     pub fn start(settings: Settings, wires: Wires) -> Master {
         let Settings { number, links, safe_state, lock, interfaces, debug_level } = settings;
         let master = Master {
@@ -171,9 +171,9 @@ impl Master {
     }
 
     /// Answers a question, from the process that drives it.
-    pub fn ask(&self, what: Ask, bytes: Vec<u8>) -> Answered {
+    pub fn ask(&self, what: Query, bytes: Vec<u8>) -> Answered {
         let level = match what {
-            Ask::Tool(ToolAsk::SetDebugLevel { level }) => Some(level),
+            Query::Tool(ToolQuery::SetDebugLevel { level }) => Some(level),
             _ => None,
         };
         let mut answered = self.ask_driver(what, bytes);
@@ -186,7 +186,7 @@ impl Master {
         answered
     }
 
-    fn ask_driver(&self, what: Ask, bytes: Vec<u8>) -> Answered {
+    fn ask_driver(&self, what: Query, bytes: Vec<u8>) -> Answered {
         let master = self.number;
         let supervisor = match &*self.driver.lock() {
             Driver::Daemon(driving, opened) => Ok((driving.supervisor().clone(), opened.clone())),
@@ -322,7 +322,7 @@ impl Master {
 
     /// Tries again what was not possible before, prepares sockets for the next owner's end, and gives interfaces that
     /// have come back to the process that drives the master.
-    pub fn look_after(&self) {
+    pub fn supervise(&self) {
         self.prepare();
         self.leave_alone();
         let is_faulty = matches!(&*self.driver.lock(), Driver::Fault(_));
@@ -442,14 +442,14 @@ mod tests {
             panic!("expected by the test");
         }));
         assert!(failed.is_err());
-        assert!(matches!(owner.ask(Ask::State, Vec::new()), Err(Refusal::Changing { .. })));
+        assert!(matches!(owner.ask(Query::State, Vec::new()), Err(Refusal::Changing { .. })));
         let fault = master.state().fault.expect("nothing drives it");
         assert_eq!(fault, FAILED);
         let told = far.receive_with_descriptors(Limits::OWNER, None).expect("the links were sent").0.content;
         assert!(matches!(told, Content::Taken(_)), "{told:?}");
         let told = far.receive(Limits::OWNER, None).expect("it is told");
         assert_eq!(told, Content::TakenBack { cause: FAILED.to_owned() }.into());
-        master.look_after();
+        master.supervise();
         assert_eq!((master.state().fault, master.state().owner), (None, None));
         master.hand_over(&owner).expect("the daemon drives it").end(End::Ended);
         assert_eq!((master.state().fault, master.state().owner), (None, None));

@@ -10,7 +10,7 @@ use std::os::unix::net::UnixStream;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use ringcat_control::message::{Answer, Ask, Content, Message, Numbered, Owner};
+use ringcat_control::message::{Answer, Content, Message, Numbered, Owner, Query};
 use ringcat_control::{Connection, Refusal, Right};
 use ringcat_link::process::wait_readable;
 
@@ -104,14 +104,14 @@ impl OwnerLink {
     ///
     /// # Errors
     /// The owner refuses, is silent, or has ended.
-    pub fn ask(&self, what: Ask, bytes: Vec<u8>) -> Answered {
+    pub fn ask(&self, what: Query, bytes: Vec<u8>) -> Answered {
         let (master, size, limit) = (self.master, bytes.len(), what.limit());
         let mut questions = self.place(size, what.right())?;
         questions.last = questions.last.wrapping_add(1);
         let id = questions.last;
         questions.open.insert(id, Question { bytes: size, state: Standing::Sent });
         drop(questions);
-        let message = Message { content: Content::Ask(Numbered { id, master, what }), bytes };
+        let message = Message { content: Content::Query(Numbered { id, master, what }), bytes };
         match self.connection.send_within(&message, SILENCE) {
             Ok(()) => self.wait(id, limit),
             // A part of it may have left: the rest follows, and so may an answer.
@@ -240,7 +240,7 @@ mod tests {
 
     use super::*;
 
-    const QUESTION: Ask = Ask::AlStatus { position: 1 };
+    const QUESTION: Query = Query::AlStatus { position: 1 };
 
     // covers: daemon
     #[test]
@@ -262,7 +262,7 @@ mod tests {
         let begin = Instant::now();
         assert!(matches!(owner.ask(QUESTION, Vec::new()), Err(Refusal::TooManyQuestions { .. })));
         assert!(begin.elapsed() < 2 * SILENCE);
-        let refused = owner.ask(Ask::Rescan, Vec::new()).expect_err("nothing answers");
+        let refused = owner.ask(Query::Rescan, Vec::new()).expect_err("nothing answers");
         assert!(matches!(refused, Refusal::Silent { .. }), "questions that change have places of their own: {refused}");
     }
 
@@ -274,7 +274,7 @@ mod tests {
         let asking = owner.clone();
         let first = thread::spawn(move || asking.ask(QUESTION, vec![1]));
         let question = far.receive(Limits::OWNER, None).expect("it is asked");
-        let Content::Ask(Numbered { id, .. }) = question.content else { panic!("{question:?}") };
+        let Content::Query(Numbered { id, .. }) = question.content else { panic!("{question:?}") };
         owner.taken(id);
         owner.answered(id + 1, Ok((Answer::Done, Vec::new())));
         thread::sleep(SILENCE + Duration::from_millis(100));

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ringcat::Activity;
-use ringcat_control::message::{Answer, Ask};
+use ringcat_control::message::{Answer, Query};
 use ringcat_control::socket::to_listen_at;
 use ringcat_link::HeldSignals;
 use ringcat_link::capabilities::{Capabilities, keep};
@@ -109,7 +109,7 @@ fn serve(daemon: &Daemon, up_down: &mut UpDown, held: &HeldSignals) {
         if looked.elapsed() >= LOOK {
             looked = Instant::now();
             up_down.look();
-            daemon.look_after();
+            daemon.supervise();
         }
     }
     manager.stop();
@@ -130,7 +130,7 @@ impl Status {
         let (text, is_ready) = match (state.owner, state.fault) {
             (_, Some(fault)) => (format!("master {number} is not driven: {fault}"), true),
             (Some(owner), None) => (format!("master {number} is driven by {owner}"), true),
-            (None, None) => match master.ask(Ask::State, Vec::new()) {
+            (None, None) => match master.ask(Query::State, Vec::new()) {
                 Ok((Answer::State(state), _)) => {
                     let is_scanned = !matches!(state.activity, Activity::Unscanned | Activity::Scanning);
                     let count = state.subdevices.len();

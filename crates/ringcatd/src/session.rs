@@ -6,7 +6,7 @@ use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::time::Duration;
 
-use ringcat_control::message::{Answer, Ask, Content, Message, Numbered, Owner};
+use ringcat_control::message::{Answer, Content, Message, Numbered, Owner, Query};
 use ringcat_control::{Connection, Limits, ReceiveError, Refusal, Right};
 use ringcat_link::process::Peer;
 
@@ -38,13 +38,13 @@ impl Masters {
         found.ok_or_else(|| Refusal::NoMaster { master: number, present: present() })
     }
 
-    fn ask(&self, right: Right, question: Numbered<Ask>, bytes: Vec<u8>) -> Answered {
+    fn ask(&self, right: Right, question: Numbered<Query>, bytes: Vec<u8>) -> Answered {
         let Numbered { master, what, .. } = question;
         if what.right() > right {
             return Err(Refusal::ReadOnly);
         }
         match what {
-            Ask::Masters => Ok((Answer::Masters(self.all.iter().map(Master::state).collect()), Vec::new())),
+            Query::Masters => Ok((Answer::Masters(self.all.iter().map(Master::state).collect()), Vec::new())),
             what => self.find(master)?.ask(what, bytes),
         }
     }
@@ -88,7 +88,7 @@ fn converse(connection: &Arc<Connection>, process: ClientProcess, masters: &Mast
                 reply(connection, Content::Welcome { right, pid: std::process::id() }.into());
             }
             _ if program.is_empty() => return Err(expected("a greeting with the name of a program")),
-            Content::Ask(question) => {
+            Content::Query(question) => {
                 let (id, master) = (question.id, question.master);
                 let (what, bytes) = match masters.ask(right, question, message.bytes) {
                     Ok((answer, bytes)) => (Ok(answer), bytes),

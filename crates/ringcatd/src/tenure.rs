@@ -86,7 +86,7 @@ pub fn serve(master: &Master, owner: &OwnerLink, mut signs: Signs, stop_limit: D
         if ready & 1 != 0 {
             match connection.receive_part(&mut arriving) {
                 Ok(message) => {
-                    if let Some(end) = message.and_then(|message| said(master, owner, message)) {
+                    if let Some(end) = message.and_then(|message| take_message(master, owner, message)) {
                         return Ended { how: end, is_release: true, why: "it has given the master back" };
                     }
                 }
@@ -110,7 +110,7 @@ pub fn serve(master: &Master, owner: &OwnerLink, mut signs: Signs, stop_limit: D
 }
 
 /// Takes what an owner says; how its time has ended, if it has given the master back.
-fn said(master: &Master, owner: &OwnerLink, message: Message) -> Option<End> {
+fn take_message(master: &Master, owner: &OwnerLink, message: Message) -> Option<End> {
     match message.content {
         Content::Underway { id } => owner.taken(id),
         Content::Answer(answer) => owner.answered(answer.id, answer.what.map(|answer| (answer, message.bytes))),
@@ -160,10 +160,10 @@ mod tests {
     fn a_release_without_usable_knowledge_is_none_in_order() {
         let (master, (owner, _far)) = (master(), for_tests().expect("a pair"));
         for bytes in [Vec::new(), vec![1, 2, 3], vec![0xFF; 4096]] {
-            let end = said(&master, &owner, Message { content: Content::Release, bytes });
+            let end = take_message(&master, &owner, Message { content: Content::Release, bytes });
             assert_eq!(end, Some(End::Ended));
         }
-        assert_eq!(said(&master, &owner, Content::Underway { id: 1 }.into()), None);
+        assert_eq!(take_message(&master, &owner, Content::Underway { id: 1 }.into()), None);
     }
 
     // covers: daemon

@@ -4,6 +4,7 @@
 //! A failing test prints the seed and the log.
 
 mod board;
+mod member;
 mod outputs;
 mod programs;
 mod states;
@@ -14,7 +15,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use ringcat::simulated::two_hosts::{HostLinks, TwoHosts};
-use ringcat::standby::ForwardingCounters;
+use ringcat::standby::{ForwardingCounters, RoleRequest};
 use ringcat::{Instant, Link, RingState};
 use ringcat_sim::cable::{CableId, DeviceIndex, Host};
 use ringcat_sim::device::Device;
@@ -25,6 +26,7 @@ use ringcat_wire::al::{AlState, AlStatus};
 
 use self::board::Board;
 pub use self::board::{Phase, Seen};
+pub use self::member::TIME_OUT_CYCLES;
 use self::outputs::Outputs;
 pub use self::programs::CYCLE;
 use self::states::States;
@@ -84,6 +86,50 @@ impl Pair {
         self.start(host, Phase::Inactive, programs::standby_without_limit);
     }
 
+    /// Starts the program of a MainDevice of two on a host: it listens, and follows or becomes ACTIVE.
+    pub fn start_member(&mut self, host: Host) {
+        self.start(host, Phase::Inactive, member::member);
+    }
+
+    /// Starts both, the first one earlier, and waits until all SubDevices are in OP and the second one follows.
+    ///
+    /// # Panics
+    /// When this takes more than 5 s.
+    pub fn of_members(seed: u64, network: Network) -> Pair {
+        let mut pair = Pair::without_programs(seed, network);
+        pair.start_member(Host::First);
+        pair.run_cycles(5);
+        pair.start_member(Host::Second);
+        pair.until_ready(Host::First);
+        pair
+    }
+
+    /// Waits until a host is ACTIVE with all SubDevices in OP, and the other one could take over.
+    ///
+    /// # Panics
+    /// When this takes more than 5 s.
+    pub fn until_ready(&mut self, active: Host) {
+        for _ in 0..SETTLE_LIMIT {
+            self.cycle();
+            let seen = self.seen(active);
+            if seen.phase == Phase::Active && seen.is_last_complete && seen.is_other_ready && self.all_in_op() {
+                return;
+            }
+        }
+        panic!("{active:?} is not ACTIVE with a standby that is ready within {SETTLE_LIMIT} cycles");
+    }
+
+    /// Asks the program of a host to request a role.
+    pub fn request(&mut self, host: Host, request: RoleRequest) {
+        self.say(format!("{host:?}: {request:?}"));
+        self.boards[host as usize].ask_for(request);
+    }
+
+    /// Longest time between outputs that a SubDevice took, since the last call. One that never took any is left out.
+    pub fn take_longest_gap(&mut self) -> Duration {
+        self.outputs.take_longest_gap()
+    }
+
     fn start(&mut self, host: Host, phase: Phase, program: fn(HostLinks, &Board)) {
         self.say(format!("{host:?} starts: {phase:?}"));
         let board = Arc::new(Board::new(phase));
@@ -116,11 +162,12 @@ impl Pair {
     /// Lets a cycle pass, and checks what happened in it.
     pub fn cycle(&mut self) {
         self.hosts.run_for(CYCLE);
-        let phases = Host::ALL.map(|host| self.seen(host).phase);
+        let seen = Host::ALL.map(|host| self.seen(host));
+        let phases = seen.each_ref().map(|seen| seen.phase);
         let Pair { hosts, outputs, states, traffic, .. } = self;
         let now = hosts.now();
         let steps = hosts.with_network(|network| {
-            traffic.check(network.take_host_log(), phases);
+            traffic.check(network.take_host_log(), &seen);
             outputs.check(network);
             states.check(network, outputs, phases)
         });

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// Name, arguments, and a part of what it prints at its end.
-const RUN: [(&str, &[&str], &str); 8] = [
+const RUN: [(&str, &[&str], &str); 9] = [
     ("csp_drive", &[], "back at 0, largest following error"),
     ("eni", &[], "outputs Drive.Control word"),
     ("firmware_update", &[], "20012 bytes written\nversion 2.7"),
@@ -13,6 +13,7 @@ const RUN: [(&str, &[&str], &str); 8] = [
     ("ring_with_a_cut", &[], "ring Open, broken between SubDevice 1 port 1 and SubDevice 2 port 0"),
     ("running_light", &[], "working counter 2 of 2 after 500 cycles"),
     ("sdo_from_another_thread", &[], "SDO 0x7777:00: aborted by the SubDevice: 0x06020000"),
+    ("two_controllers", &[], "Second: taken over: 4 SubDevices go on as they are"),
     ("two_threads", &[], "working counter 1 of 1; "),
 ];
 
@@ -43,7 +44,7 @@ fn run(name: &str, arguments: &[&str]) -> Option<Output> {
     Some(output)
 }
 
-// covers: library, eni-run, foe, ring-cut, threads
+// covers: library, eni-run, foe, ring-cut, threads, standby
 #[test]
 fn examples_run_to_their_end_and_show_what_they_are_for() {
     for (name, arguments, shown) in RUN {

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use ringcat::daemon::{Answer, Ask, Client, OwnedBus};
+use ringcat::daemon::{Answer, Client, OwnedBus, Query};
 use ringcat::piped::segment::PipedSegment;
 use ringcat::sim::network::Network;
 use ringcat::sim::segment::Segment;
@@ -55,7 +55,7 @@ impl Bench {
         let begin = Instant::now();
         let mut client = Client::connect(&self.socket, "test").expect("the daemon listens");
         loop {
-            let asked = client.ask(3, Ask::State, Vec::new());
+            let asked = client.ask(3, Query::State, Vec::new());
             if matches!(&asked, Ok((Answer::State(state), _)) if state.activity == Activity::Scanned
                 && state.subdevices.len() == 4)
             {

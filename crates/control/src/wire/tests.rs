@@ -1,9 +1,9 @@
 use super::*;
-use crate::message::{Answer, Ask, Numbered};
+use crate::message::{Answer, Numbered, Query};
 
 fn upload() -> Message {
-    let ask = Ask::SdoUpload { position: 3, index: 0x1018, sub_index: Some(1) };
-    Content::Ask(Numbered { id: 7, master: 1, what: ask }).into()
+    let ask = Query::SdoUpload { position: 3, index: 0x1018, sub_index: Some(1) };
+    Content::Query(Numbered { id: 7, master: 1, what: ask }).into()
 }
 
 // covers: daemon

@@ -8,6 +8,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use ringcat_wire::master_frame::{Diagnosis, DomainRecord};
 
 use super::sheet::Sheet;
+use crate::time::Instant;
 
 /// Room for the knowledge of a segment: some 300 SubDevices with their SIIs. More is not sent.
 pub const KNOWLEDGE_ROOM: usize = 256 * 1024;
@@ -29,6 +30,10 @@ pub struct StandbyWords {
     identity: AtomicU64,
     /// The last takeover went on with process data of the other MainDevice.
     is_hot: AtomicBool,
+    /// When a frame of the other MainDevice came last while there was no application; 0 before. Writers: both halves.
+    heard_at: AtomicU64,
+    /// Its version and the oldest one that could read it, if this MainDevice cannot; 0 otherwise.
+    other_version: AtomicU32,
 }
 
 impl Default for StandbyWords {
@@ -40,6 +45,8 @@ impl Default for StandbyWords {
             session: AtomicU32::new(0),
             identity: AtomicU64::new(0),
             is_hot: AtomicBool::new(false),
+            heard_at: AtomicU64::new(0),
+            other_version: AtomicU32::new(0),
         }
     }
 }
@@ -60,6 +67,28 @@ impl StandbyWords {
     /// configuration.
     pub fn is_hot(&self) -> bool {
         self.is_hot.load(Ordering::Acquire)
+    }
+
+    /// Posts that a frame of the other MainDevice has come.
+    pub fn post_heard(&self, now: Instant) {
+        self.heard_at.fetch_max(now.0.max(1), Ordering::Relaxed);
+    }
+
+    /// When one came last.
+    pub fn heard_at(&self) -> Option<Instant> {
+        let at = self.heard_at.load(Ordering::Relaxed);
+        (at != 0).then_some(Instant(at))
+    }
+
+    /// Posts that the other MainDevice has a version that cannot be read.
+    pub fn post_other_version(&self, least: u8, got: u8) {
+        self.other_version.store(1 << 16 | u32::from(least) << 8 | u32::from(got), Ordering::Relaxed);
+    }
+
+    /// The oldest version that could read its master frames, and its version.
+    pub fn other_version(&self) -> Option<(u8, u8)> {
+        let word = self.other_version.load(Ordering::Relaxed);
+        (word != 0).then_some(((word >> 8) as u8, word as u8))
     }
 
     /// Session and digest of the configuration of the other MainDevice; `None` before its first header.

@@ -141,7 +141,8 @@ impl Exchange {
         oldest.any(|at| self.frames.get(at).is_some_and(|frame| outcome(frame, self.again.get(at)).waiting))
     }
 
-    /// Whether copies of frames may still come back, including second copies of frames whose inputs are delivered.
+    /// Whether copies of frames may still come back, including second copies of frames whose inputs are delivered. As
+    /// INACTIVE, frames of the other MainDevice may come at any time.
     pub fn awaits_copies(&self) -> bool {
         let is_open = |frame: &CyclicFrame| frame.is_waiting() || frame.is_delivered();
         self.decide_at != Instant::NEVER || self.frames.iter().any(is_open) || self.standby.awaits_copies()
@@ -224,6 +225,13 @@ impl Exchange {
     /// [`CyclicCounters::received`]: while this stays the same, so do the others.
     pub fn disturbances(&self) -> u64 {
         self.tally.disturbances
+    }
+
+    /// Whether this MainDevice is INACTIVE: nothing is sent, and frames of the other MainDevice of the ring are to be
+    /// forwarded.
+    #[inline(always)]
+    pub fn is_inactive(&self) -> bool {
+        self.standby.is_inactive()
     }
 
     /// Takes the oldest kept frame of another MainDevice (protocol MR-10).

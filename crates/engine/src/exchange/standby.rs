@@ -14,6 +14,7 @@ pub mod state;
 
 use alloc::boxed::Box;
 
+use ringcat_wire::frame::MacAddress;
 use ringcat_wire::master_frame::{Header, NotReady};
 
 use super::Exchange;
@@ -21,8 +22,8 @@ use super::following::{Following, OutputsSeen};
 use super::master_frames::MasterFrames;
 use crate::domain::DomainId;
 use crate::layout::Layout;
-use crate::link::LinkSet;
-use crate::role::{MainDeviceRole, Partner};
+use crate::link::{Link, LinkSet};
+use crate::role::{MainDeviceRole, Partner, RoleControl};
 use crate::time::Instant;
 
 use partner::{Items, PartnerWatch};
@@ -57,6 +58,7 @@ impl Exchange {
             offered: 0,
             shown: None,
             foreign_in: 0,
+            collided_with: None,
             other_version: None,
             noticed: None,
             begun_at: Instant::NEVER,
@@ -65,6 +67,28 @@ impl Exchange {
             control,
             words,
         })));
+    }
+
+    /// Whether this MainDevice is one of two in a ring.
+    #[inline(always)]
+    pub fn is_of_two(&self) -> bool {
+        self.standby.0.is_some()
+    }
+
+    /// The role, and requests for another one: for any thread. `None` without MainDevice redundancy.
+    pub fn role_control(&self) -> Option<RoleControl> {
+        self.standby.0.as_ref().map(|state| state.control.clone())
+    }
+
+    /// Takes the address of another MainDevice of which a frame has come since the last call, while this one is
+    /// ACTIVE. Bytes 3 to 5 are those of its main interface.
+    pub fn take_collision(&mut self) -> Option<MacAddress> {
+        self.standby.0.as_deref_mut()?.collided_with.take()
+    }
+
+    /// Whether a link has a carrier, as the acyclic half knows it; `None` if the links do not report it.
+    pub fn carrier(&self, link: Link) -> Option<bool> {
+        self.board.live.carrier(link)
     }
 
     /// The role; ACTIVE without MainDevice redundancy.

@@ -1,30 +1,23 @@
 //! An INACTIVE MainDevice without an application: it listens to the ACTIVE, and learns what it needs to follow
 //! (protocol 9.10).
 
-use core::time::Duration;
-
-use ringcat_wire::master_frame::Header;
-
 use super::MainDevice;
+use super::listener::{Heard, Listener, known};
 use crate::event::{Event, StandbyEvent};
-use crate::exchange::following::Unusable;
+use crate::knowledge::Knowledge;
 use crate::link::Link;
 use crate::role::MainDeviceRole;
 use crate::time::Instant;
 
-/// What an INACTIVE MainDevice has heard of the ACTIVE.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub struct Heard {
-    /// When a frame of another MainDevice came last.
-    pub at: Option<Instant>,
-    /// Period of its cycles; `None` before a master frame.
-    pub period: Option<Duration>,
-    /// All that is needed to follow it has arrived ([`MainDevice::follow`]).
-    pub is_known: bool,
-}
-
 impl MainDevice {
+    /// A listener for the thread that has the links on which master frames come, in place of all before:
+    /// [`MainDevice::fill`] then only notes that a frame has come. `None` without the options of MainDevice redundancy.
+    pub fn split_listener(&mut self) -> Option<Listener> {
+        let standby = self.standby.as_mut()?;
+        standby.listener = None;
+        Some(Listener::new(standby.words.clone()))
+    }
+
     /// Takes and fills a received frame of another MainDevice before it is forwarded, without an application: as
     /// INACTIVE with the options of MainDevice redundancy. Any bytes are allowed. With an application it is
     /// [`Exchange::fill`](crate::exchange::Exchange::fill).
@@ -33,9 +26,17 @@ impl MainDevice {
             return;
         }
         let Some(standby) = &mut self.standby else { return };
-        standby.heard_at = Some(now);
-        standby.listening.fill(arrived_on, frame, now);
-        if let Some(Unusable::Version { least, got }) = standby.listening.unusable
+        match &mut standby.listener {
+            Some(listener) => listener.fill(arrived_on, frame, now),
+            None => standby.words.post_heard(now),
+        }
+        self.report_version(now);
+    }
+
+    /// Reports that the ACTIVE has master frames of a version that cannot be read.
+    pub(super) fn report_version(&mut self, now: Instant) {
+        let Some(standby) = &mut self.standby else { return };
+        if let Some((least, got)) = standby.words.other_version()
             && standby.other_version.replace(got) != Some(got)
         {
             let event = Event::Standby(StandbyEvent::OtherVersion { got, least });
@@ -46,12 +47,13 @@ impl MainDevice {
     /// What was heard of the ACTIVE while there is no application.
     pub fn heard(&self) -> Heard {
         let Some(standby) = &self.standby else { return Heard::default() };
-        let newest = standby.listening.newest().and_then(|(cycle, _)| standby.listening.header_of(cycle));
-        let period = |(Header { period_ns, .. }, _)| Duration::from_nanos(u64::from(period_ns));
-        Heard {
-            at: standby.heard_at,
-            period: newest.map(period).filter(|period| !period.is_zero()),
-            is_known: self.heard_configuration().is_some() && self.heard_knowledge().is_some(),
-        }
+        let at = standby.words.heard_at();
+        standby.listener.as_ref().map_or(Heard { at, ..Heard::default() }, Listener::heard)
+    }
+
+    /// Knowledge of the segment that the ACTIVE has sent, with which an application can follow it
+    /// ([`MainDevice::follow`]); `None` before all of it has arrived.
+    pub fn heard_knowledge(&self) -> Option<Knowledge> {
+        known(&self.standby.as_ref()?.words)
     }
 }

@@ -10,7 +10,6 @@ use super::declaration::Declaration;
 use super::identity::Configuration;
 use super::standby::Marks;
 use crate::exchange::{Exchange, StandbySetup};
-use crate::knowledge::Knowledge;
 use crate::layout::{Layout, LayoutError, LrwPolicy, PlannedMasterFrames};
 use crate::link::LinkSet;
 use crate::role::{MainDeviceRole, RoleControl};
@@ -26,13 +25,6 @@ impl MainDevice {
     /// The role, and requests for another one: for any thread.
     pub fn role_control(&self) -> RoleControl {
         self.roles.clone()
-    }
-
-    /// Knowledge of the segment that the ACTIVE has sent, with which an application can follow it
-    /// ([`MainDevice::follow`]); `None` before all of it has arrived.
-    pub fn heard_knowledge(&self) -> Option<Knowledge> {
-        let (_, bytes) = self.standby.as_ref()?.words.heard.copy()?;
-        Knowledge::from_bytes(&bytes).ok()
     }
 
     /// Session and digest of the configuration of the ACTIVE; `None` before a frame of it.

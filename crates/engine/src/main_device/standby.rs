@@ -2,13 +2,11 @@
 
 use alloc::sync::Arc;
 
-use ringcat_wire::master_frame::{Lengths, NotReady};
-
 use super::identity::Configuration;
+use super::listener::Listener;
 use super::standby_options::StandbyOptions;
 use crate::board::standby::StandbyWords;
 use crate::event::{CyclicEvent, Event};
-use crate::exchange::following::Following;
 use crate::time::Instant;
 
 /// What a MainDevice has for redundancy.
@@ -20,10 +18,8 @@ pub(super) struct Standby {
     pub configuration: Configuration,
     /// Session of the process data.
     pub session: Option<u32>,
-    /// What is heard of the ACTIVE without an application.
-    pub listening: Following,
-    /// When.
-    pub heard_at: Option<Instant>,
+    /// Takes what is heard of the ACTIVE without an application, unless another thread does.
+    pub listener: Option<Listener>,
     /// A version of the ACTIVE that cannot be read, and was reported.
     pub other_version: Option<u8>,
     /// When the knowledge is made next, at the earliest and if nothing has changed.
@@ -46,15 +42,12 @@ pub(super) struct Marks {
 impl Standby {
     pub fn new(options: StandbyOptions) -> Standby {
         let words: Arc<StandbyWords> = Arc::default();
-        let mut listening = Following::new(Lengths::default(), words.clone());
-        listening.answer.not_ready = NotReady::NO_APPLICATION;
         Standby {
             options,
+            listener: Some(Listener::new(words.clone())),
             words,
             configuration: Configuration::default(),
             session: None,
-            listening,
-            heard_at: None,
             other_version: None,
             publish_at: (Instant(0), Instant(0)),
             published: None,

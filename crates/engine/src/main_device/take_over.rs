@@ -28,6 +28,7 @@ impl MainDevice {
             return;
         }
         if self.active().is_none() {
+            self.report_version(now);
             self.take_request(now);
         } else if self.role_followed != self.roles.changes() {
             self.role_followed = self.roles.changes();

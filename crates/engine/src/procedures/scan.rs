@@ -185,7 +185,7 @@ async fn read_while_settling(
     options: &ScanOptions,
     expected: &Count,
     power_ons: &mut PowerOns,
-) -> Result<Vec<Said>, Failure> {
+) -> Result<Vec<Identified>, Failure> {
     let mut reading = pin!(identify(bus, expected.total() as u16, options, power_ons));
     let mut read = None;
     let mut settling = pin!(count::settle(bus, expected, options.settle));
@@ -246,7 +246,7 @@ pub(super) async fn connect(
 }
 
 /// Data of one SubDevice.
-pub(super) struct Said {
+pub(super) struct Identified {
     /// Its SII.
     pub contents: SiiContents,
     /// Its explicit device identification.
@@ -261,7 +261,7 @@ async fn identify(
     count: u16,
     options: &ScanOptions,
     power_ons: &mut PowerOns,
-) -> Result<Vec<Said>, ScanError> {
+) -> Result<Vec<Identified>, ScanError> {
     let (levelled, sources) = bus.both(level(bus), power_ons.read(bus, count)).await;
     levelled?;
     let are_clean = to_init(bus, count).await?;
@@ -270,7 +270,7 @@ async fn identify(
         clear_errors(bus, count).await?;
     }
     let mut all = read_all(bus, count, options).await?;
-    all.iter_mut().zip(sources).for_each(|(said, source)| said.pdo_source = source);
+    all.iter_mut().zip(sources).for_each(|(identified, source)| identified.pdo_source = source);
     Ok(all)
 }
 
@@ -347,7 +347,7 @@ async fn assign_addresses(bus: &Bus, count: u16) -> Result<(), BusError> {
     written.await.into_iter().collect()
 }
 
-async fn read_all(bus: &Bus, count: u16, options: &ScanOptions) -> Result<Vec<Said>, ScanError> {
+async fn read_all(bus: &Bus, count: u16, options: &ScanOptions) -> Result<Vec<Identified>, ScanError> {
     let total = usize::from(count);
     let step = total.div_ceil(PROGRESS_STEPS).max(1);
     let done = Rc::new(Cell::new(0_usize));
@@ -371,7 +371,7 @@ pub(super) async fn ask(
     station: StationAddress,
     cache: &SiiCache,
     extent: SiiExtent,
-) -> Result<Said, ScanError> {
+) -> Result<Identified, ScanError> {
     let read = sii::read(bus, station, cache, extent).await;
     bus.step(Subject::Scan, || match &read {
         Ok(_) => format!("position {position}: SII read, station address {station}"),
@@ -384,11 +384,11 @@ pub(super) async fn ask(
         Err(error) => {
             bus.notice(Notice::SiiOddity { position, what: error.to_string() });
             let contents = SiiContents::unreadable();
-            return Ok(Said { contents, identification: None, pdo_source: PdoSource::Outdated });
+            return Ok(Identified { contents, identification: None, pdo_source: PdoSource::Outdated });
         }
     };
     let identification = identification::read(bus, station, &contents).await?;
-    Ok(Said { contents, identification, pdo_source: PdoSource::Outdated })
+    Ok(Identified { contents, identification, pdo_source: PdoSource::Outdated })
 }
 
 /// Reads one SubDevice: SII, controller, ports, alias, receive times.
@@ -410,8 +410,8 @@ pub(super) async fn read_whole(
     cache: &SiiCache,
 ) -> Result<SubDeviceInfo, ServiceError> {
     let contents = sii::read(bus, station, cache, SiiExtent::Complete).await.map_err(SiiProgramError::Read)?;
-    let said = Said { contents, identification: None, pdo_source: PdoSource::Outdated };
-    Ok(describe(read_registers(bus, position, station).await?, &said))
+    let identified = Identified { contents, identification: None, pdo_source: PdoSource::Outdated };
+    Ok(describe(read_registers(bus, position, station).await?, &identified))
 }
 
 /// Reads controller, ports, alias and receive times.
@@ -454,10 +454,10 @@ fn answered<const N: usize, const M: usize>(
     data.ok_or(BusError::Wkc { target, expected, got })
 }
 
-pub(super) fn describe(readout: Readout, said: &Said) -> SubDeviceInfo {
-    let Said { contents, .. } = said;
+pub(super) fn describe(readout: Readout, identified: &Identified) -> SubDeviceInfo {
+    let Identified { contents, .. } = identified;
     let mut info = SubDeviceInfo::from_parts(readout, &contents.header, contents.categories());
-    (info.identification, info.pdo_source) = (said.identification, said.pdo_source);
+    (info.identification, info.pdo_source) = (identified.identification, identified.pdo_source);
     info.limit_to(contents.extent);
     let (category, offset, problem) = match contents.end {
         ChainEnd::Unreadable => {

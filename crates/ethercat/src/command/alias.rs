@@ -1,6 +1,6 @@
 //! `alias`: writes aliases into the SIIs.
 
-use ringcat_control::tool::ToolAsk;
+use ringcat_control::tool::ToolQuery;
 
 use crate::failure::Failure;
 use crate::numbers;
@@ -38,7 +38,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     }
     for slave in slaves {
         let position = slave.line.position;
-        session.done(master, ToolAsk::AliasWrite { position, alias, force }, Vec::new())?;
+        session.done(master, ToolQuery::AliasWrite { position, alias, force }, Vec::new())?;
     }
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! `config`: what the application has declared.
 
-use ringcat_control::tool::{DeclaredLine, MOST_DECLARED, Piece, ToolAnswer, ToolAsk};
+use ringcat_control::tool::{DeclaredLine, MOST_DECLARED, Piece, ToolAnswer, ToolQuery};
 
 use super::config_details::details;
 use crate::failure::Failure;
@@ -61,7 +61,7 @@ pub(super) fn declared(session: &mut Session<'_>, master: u32) -> Result<Vec<Dec
     let mut lines: Vec<DeclaredLine> = Vec::new();
     loop {
         let from = u16::try_from(lines.len()).unwrap_or(u16::MAX);
-        let answer = session.tool(master, ToolAsk::Declared { from })?;
+        let answer = session.tool(master, ToolQuery::Declared { from })?;
         let ToolAnswer::Declared(Piece { total, these }) = answer else { return Err(unexpected()) };
         let is_last = these.len() < MOST_DECLARED;
         lines.extend(these);

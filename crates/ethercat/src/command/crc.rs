@@ -1,7 +1,7 @@
 //! `crc`: error counters of all ports.
 
-use ringcat_control::message::Ask;
-use ringcat_control::tool::{MOST_SUBDEVICES, Piece, PortLine, PortsLine, ToolAnswer, ToolAsk};
+use ringcat_control::message::Query;
+use ringcat_control::tool::{MOST_SUBDEVICES, Piece, PortLine, PortsLine, ToolAnswer, ToolQuery};
 
 use crate::failure::Failure;
 use crate::selection::Slave;
@@ -42,7 +42,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let slaves = session.all_slaves(master)?;
     if is_reset {
         for slave in slaves {
-            let ask = Ask::RegisterWrite { position: slave.line.position, address: COUNTERS };
+            let ask = Query::RegisterWrite { position: slave.line.position, address: COUNTERS };
             session.ask(master, ask, vec![0; COUNTER_BYTES])?;
         }
         return Ok(());
@@ -57,7 +57,7 @@ pub(super) fn ports(session: &mut Session<'_>, master: u32) -> Result<Vec<PortsL
     let mut lines: Vec<PortsLine> = Vec::new();
     loop {
         let from = u16::try_from(lines.len()).unwrap_or(u16::MAX);
-        let answer = session.tool(master, ToolAsk::Ports { from, most: MOST_SUBDEVICES as u16 })?;
+        let answer = session.tool(master, ToolQuery::Ports { from, most: MOST_SUBDEVICES as u16 })?;
         let ToolAnswer::Ports(Piece { total, these }) = answer else { return Err(unexpected()) };
         let is_last = these.len() < MOST_SUBDEVICES;
         lines.extend(these);

@@ -1,6 +1,6 @@
 //! `debug`: the level of messages.
 
-use ringcat_control::tool::ToolAsk;
+use ringcat_control::tool::ToolQuery;
 
 use crate::failure::Failure;
 use crate::numbers;
@@ -23,7 +23,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let [text] = session.words() else { return Err(Failure::usage("'debug' needs one argument: the level!")) };
     let level = numbers::parse(text).ok_or_else(|| Failure::usage(format!("Invalid debug level '{text}'!")))?;
     for master in session.masters()? {
-        session.done(master.master, ToolAsk::SetDebugLevel { level }, Vec::new())?;
+        session.done(master.master, ToolQuery::SetDebugLevel { level }, Vec::new())?;
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! `domains`: domains of the application with their process data.
 
-use ringcat_control::message::{Answer, Ask};
-use ringcat_control::tool::{DomainLine, ToolAnswer, ToolAsk};
+use ringcat_control::message::{Answer, Query};
+use ringcat_control::tool::{DomainLine, ToolAnswer, ToolQuery};
 
 use crate::failure::Failure;
 use crate::hex;
@@ -45,7 +45,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
 /// The selected domains of a master: number, domain, image.
 pub(super) fn selected(session: &mut Session<'_>, master: u32) -> Result<Vec<(u32, DomainLine, Vec<u8>)>, Failure> {
     let list = session.list(session.arguments.domain.as_deref(), "domain")?;
-    let (answer, images) = session.ask(master, Ask::Tool(ToolAsk::Domains), Vec::new())?;
+    let (answer, images) = session.ask(master, Query::Tool(ToolQuery::Domains), Vec::new())?;
     let Answer::Tool(ToolAnswer::Domains(domains)) = answer else { return Err(unexpected()) };
     let mut rest = &images[..];
     let mut selected = Vec::new();

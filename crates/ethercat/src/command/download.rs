@@ -1,6 +1,6 @@
 //! `download`: writes an object.
 
-use ringcat_control::message::Ask;
+use ringcat_control::message::Query;
 
 use super::upload::{data_type, sdo_index, sdo_sub_index};
 use crate::aborts::of_sdo;
@@ -37,7 +37,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         (None, None) => data_types::named("octet_string")?,
     };
     let bytes = value_bytes(data_type, value)?;
-    let ask = Ask::SdoDownload { position, index, sub_index };
+    let ask = Query::SdoDownload { position, index, sub_index };
     session.ask(master, ask, bytes).map_err(of_sdo)?;
     Ok(())
 }

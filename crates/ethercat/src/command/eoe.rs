@@ -1,6 +1,6 @@
 //! `eoe`: network interfaces of Ethernet over EtherCAT.
 
-use ringcat_control::tool::{EthernetLine, ToolAnswer, ToolAsk};
+use ringcat_control::tool::{EthernetLine, ToolAnswer, ToolQuery};
 
 use crate::failure::Failure;
 use crate::session::{Session, unexpected};
@@ -21,7 +21,7 @@ sent. Without interfaces there is no output.
 
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     for master in session.masters()? {
-        let answer = session.tool(master.master, ToolAsk::Ethernet)?;
+        let answer = session.tool(master.master, ToolQuery::Ethernet)?;
         let ToolAnswer::Ethernet(lines) = answer else { return Err(unexpected()) };
         if !lines.is_empty() {
             session.write(table(master.master, &lines).as_bytes())?;

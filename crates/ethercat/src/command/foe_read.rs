@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use ringcat_control::tool::ToolAsk;
+use ringcat_control::tool::ToolQuery;
 
 use crate::aborts::of_foe;
 use crate::failure::Failure;
@@ -29,7 +29,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let [name] = session.words() else { return Err(Failure::usage("'foe_read' takes one argument: the file!")) };
     let name = name.clone();
     let (master, position) = session.single_slave()?;
-    let asked = session.done(master, ToolAsk::FileRead { position, name }, Vec::new());
+    let asked = session.done(master, ToolQuery::FileRead { position, name }, Vec::new());
     let bytes = asked.map_err(|failure| of_foe(failure, "read"))?;
     session.say_if_verbose(&format!("Read {} bytes of FoE data.", bytes.len()));
     match session.arguments.output_file.clone().filter(|file| file != "-") {

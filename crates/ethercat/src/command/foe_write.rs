@@ -4,7 +4,7 @@ use std::collections::hash_map::RandomState;
 use std::hash::BuildHasher;
 use std::path::Path;
 
-use ringcat_control::tool::{MOST_FILE, MOST_PART, ToolAsk};
+use ringcat_control::tool::{MOST_FILE, MOST_PART, ToolQuery};
 
 use crate::aborts::of_foe;
 use crate::failure::Failure;
@@ -44,10 +44,10 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let transfer = RandomState::new().hash_one(std::process::id());
     let mut offset = 0;
     for part in bytes.chunks(MOST_PART) {
-        session.done(master, ToolAsk::FilePart { transfer, offset }, part.to_vec())?;
+        session.done(master, ToolQuery::FilePart { transfer, offset }, part.to_vec())?;
         offset += part.len() as u32;
     }
-    let asked = session.done(master, ToolAsk::FileWrite { position, name, transfer }, Vec::new());
+    let asked = session.done(master, ToolQuery::FileWrite { position, name, transfer }, Vec::new());
     asked.map_err(|failure| of_foe(failure, "write"))?;
     session.say_if_verbose("FoE writing finished.");
     Ok(())

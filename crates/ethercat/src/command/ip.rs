@@ -1,6 +1,6 @@
 //! `ip`: sets IP parameters by EoE.
 
-use ringcat_control::tool::{IpParameters, ToolAsk};
+use ringcat_control::tool::{IpParameters, ToolQuery};
 
 use crate::failure::Failure;
 use crate::ipv4;
@@ -34,7 +34,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     }
     let ip = parameters(words)?;
     let (master, position) = session.single_slave()?;
-    session.done(master, ToolAsk::SetIp { position, ip }, Vec::new())?;
+    session.done(master, ToolQuery::SetIp { position, ip }, Vec::new())?;
     Ok(())
 }
 

@@ -5,7 +5,7 @@ use std::fs;
 use ringcat_control::client::ClientError;
 use ringcat_control::message::MasterState;
 use ringcat_control::refusal::Refusal;
-use ringcat_control::tool::{LinkReport, MasterReport, ToolAnswer, ToolAsk, Traffic, TrafficRate};
+use ringcat_control::tool::{LinkReport, MasterReport, ToolAnswer, ToolQuery, Traffic, TrafficRate};
 
 use crate::failure::Failure;
 use crate::session::{Session, unexpected};
@@ -33,7 +33,7 @@ device that sent it.
 
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     for master in session.masters()? {
-        let report = match session.tool(master.master, ToolAsk::Master) {
+        let report = match session.tool(master.master, ToolQuery::Master) {
             Ok(ToolAnswer::Master(report)) => Some(report),
             Ok(_) => return Err(unexpected()),
             // Its interface is not there: it waits.

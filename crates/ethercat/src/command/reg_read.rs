@@ -1,6 +1,6 @@
 //! `reg_read`: reads registers.
 
-use ringcat_control::message::Ask;
+use ringcat_control::message::Query;
 
 use crate::data_types;
 use crate::failure::Failure;
@@ -67,7 +67,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let (mut at, end) = (u32::from(address), u32::from(address) + u32::from(size));
     while at < end {
         let piece = (end - at).min(PIECE);
-        let ask = Ask::RegisterRead { position, address: at as u16, length: piece as u16 };
+        let ask = Query::RegisterRead { position, address: at as u16, length: piece as u16 };
         bytes.extend(session.ask(master, ask, Vec::new())?.1);
         at += piece;
     }

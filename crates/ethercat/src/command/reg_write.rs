@@ -1,7 +1,7 @@
 //! `reg_write`: writes registers.
 
-use ringcat_control::message::Ask;
-use ringcat_control::tool::ToolAsk;
+use ringcat_control::message::Query;
+use ringcat_control::tool::ToolQuery;
 
 use super::download::value_bytes;
 use super::reg_read::register;
@@ -61,8 +61,8 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     for piece in bytes.chunks(PIECE) {
         let address = at as u16;
         let ask = match is_urgent {
-            true => Ask::Tool(ToolAsk::UrgentWrite { position, address }),
-            false => Ask::RegisterWrite { position, address },
+            true => Query::Tool(ToolQuery::UrgentWrite { position, address }),
+            false => Query::RegisterWrite { position, address },
         };
         session.ask(master, ask, piece.to_vec())?;
         at += piece.len();

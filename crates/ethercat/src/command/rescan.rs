@@ -1,6 +1,6 @@
 //! `rescan`: scans the ring again.
 
-use ringcat_control::message::Ask;
+use ringcat_control::message::Query;
 
 use crate::failure::Failure;
 use crate::session::Session;
@@ -18,7 +18,7 @@ pub const COMMAND: Command = Command {
 
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     for master in session.masters()? {
-        session.ask(master.master, Ask::Rescan, Vec::new())?;
+        session.ask(master.master, Query::Rescan, Vec::new())?;
     }
     Ok(())
 }

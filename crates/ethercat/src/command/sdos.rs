@@ -1,6 +1,6 @@
 //! `sdos`: the dictionaries of SubDevices.
 
-use ringcat_control::tool::{EntryLine, ToolAnswer, ToolAsk};
+use ringcat_control::tool::{EntryLine, ToolAnswer, ToolQuery};
 use ringcat_wire::sii::MailboxProtocols;
 
 use super::slaves::description;
@@ -57,12 +57,12 @@ fn dictionary(session: &mut Session<'_>, master: u32, position: u16) -> Result<(
     if !has_objects {
         return Ok(());
     }
-    let ToolAnswer::Objects(indices) = session.tool(master, ToolAsk::Objects { position })? else {
+    let ToolAnswer::Objects(indices) = session.tool(master, ToolQuery::Objects { position })? else {
         return Err(unexpected());
     };
     for index in indices {
         // An object in the list that the SubDevice does not describe is left out.
-        let object = match session.tool(master, ToolAsk::Object { position, index }) {
+        let object = match session.tool(master, ToolQuery::Object { position, index }) {
             Ok(ToolAnswer::Object(object)) => object,
             Ok(_) => return Err(unexpected()),
             Err(failure) if failure.aborted().is_some() => continue,

@@ -1,6 +1,6 @@
 //! `sii_read`: reads an SII.
 
-use ringcat_control::message::Ask;
+use ringcat_control::message::Query;
 
 use super::sii_image::{HEAD_WORDS, categories, category_name};
 use crate::failure::Failure;
@@ -22,7 +22,7 @@ with --verbose as text, category by category.
 
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let (master, position) = session.single_slave()?;
-    let (_, image) = session.ask(master, Ask::SiiRead { position }, Vec::new())?;
+    let (_, image) = session.ask(master, Query::SiiRead { position }, Vec::new())?;
     if !session.arguments.verbose {
         return session.write(&image);
     }

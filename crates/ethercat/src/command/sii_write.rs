@@ -1,6 +1,6 @@
 //! `sii_write`: writes an SII.
 
-use ringcat_control::tool::ToolAsk;
+use ringcat_control::tool::ToolQuery;
 
 use super::sii_image::{FEWEST_WORDS, HEAD_WORDS, categories, wrong_checksum};
 use crate::failure::Failure;
@@ -36,7 +36,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         check(&image)?;
     }
     let (master, position) = session.single_slave()?;
-    session.done(master, ToolAsk::SiiWrite { position, force }, image)?;
+    session.done(master, ToolQuery::SiiWrite { position, force }, image)?;
     session.say_if_verbose("SII writing finished.");
     Ok(())
 }

@@ -1,9 +1,9 @@
 //! `slaves`: SubDevices on the ring.
 
 use ringcat_control::client::ClientError;
-use ringcat_control::message::Ask;
+use ringcat_control::message::Query;
 use ringcat_control::refusal::Refusal;
-use ringcat_control::tool::{Description, ToolAnswer, ToolAsk};
+use ringcat_control::tool::{Description, ToolAnswer, ToolQuery};
 
 use super::crc::ports;
 use super::slave_details::details;
@@ -77,7 +77,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
 
 /// What is known of a SubDevice.
 pub(super) fn description(session: &mut Session<'_>, master: u32, position: u16) -> Result<Description, Failure> {
-    match session.tool(master, ToolAsk::Description { position })? {
+    match session.tool(master, ToolQuery::Description { position })? {
         ToolAnswer::Description(description) => Ok(*description),
         _ => Err(unexpected()),
     }
@@ -93,7 +93,7 @@ pub(super) fn has_clock(
     if !details.features.dc {
         return Ok(false);
     }
-    let ask = Ask::RegisterRead { position, address: SYSTEM_TIME, length: SYSTEM_TIME_BYTES };
+    let ask = Query::RegisterRead { position, address: SYSTEM_TIME, length: SYSTEM_TIME_BYTES };
     match session.ask(master, ask, Vec::new()) {
         Ok(_) => Ok(true),
         Err(Failure::Asked(ClientError::Refused(Refusal::Service { .. } | Refusal::Failed(_)))) => Ok(false),

@@ -1,6 +1,6 @@
 //! `soe_read`: reads an IDN.
 
-use ringcat_control::message::Ask;
+use ringcat_control::message::Query;
 
 use crate::aborts::of_soe;
 use crate::data_types;
@@ -53,7 +53,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     };
     let data_type = session.arguments.data_type.as_deref().map(data_types::named).transpose()?;
     let (master, position) = session.single_slave()?;
-    let asked = session.ask(master, Ask::IdnRead { position, drive, idn }, Vec::new());
+    let asked = session.ask(master, Query::IdnRead { position, drive, idn }, Vec::new());
     let (_, bytes) = asked.map_err(|failure| of_soe(failure, "read"))?;
     match data_type {
         Some(data_type) => session.write(&data_type.show(&bytes)?),

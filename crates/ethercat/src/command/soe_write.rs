@@ -1,6 +1,6 @@
 //! `soe_write`: writes an IDN.
 
-use ringcat_control::message::Ask;
+use ringcat_control::message::Query;
 
 use super::download::value_bytes;
 use super::soe_read::{parse_drive, parse_idn};
@@ -30,7 +30,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let data_type = data_type.ok_or_else(|| Failure::usage("Please specify a data type."))?;
     let bytes = value_bytes(data_type, &value)?;
     let (master, position) = session.single_slave()?;
-    let asked = session.ask(master, Ask::IdnWrite { position, drive, idn }, bytes);
+    let asked = session.ask(master, Query::IdnWrite { position, drive, idn }, bytes);
     asked.map_err(|failure| of_soe(failure, "write"))?;
     Ok(())
 }

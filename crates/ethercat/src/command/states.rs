@@ -1,6 +1,6 @@
 //! `states`: requests states.
 
-use ringcat_control::tool::ToolAsk;
+use ringcat_control::tool::ToolQuery;
 
 use crate::failure::Failure;
 use crate::selection_help::SELECTION;
@@ -32,7 +32,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     for master in session.masters()? {
         for slave in session.listed_slaves(master.master)? {
             let position = slave.line.position;
-            session.done(master.master, ToolAsk::StartState { position, state }, Vec::new())?;
+            session.done(master.master, ToolQuery::StartState { position, state }, Vec::new())?;
         }
     }
     Ok(())

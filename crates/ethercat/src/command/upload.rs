@@ -1,7 +1,7 @@
 //! `upload`: reads an object.
 
-use ringcat_control::message::Ask;
-use ringcat_control::tool::{ToolAnswer, ToolAsk};
+use ringcat_control::message::Query;
+use ringcat_control::tool::{ToolAnswer, ToolQuery};
 
 use crate::aborts::of_sdo;
 use crate::data_types::{self, DataType};
@@ -65,7 +65,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         Some(name) => data_types::named(name)?,
         None => data_type(session, master, (position, index, sub_index))?,
     };
-    let ask = Ask::SdoUpload { position, index, sub_index: Some(sub_index) };
+    let ask = Query::SdoUpload { position, index, sub_index: Some(sub_index) };
     let (_, value) = session.ask(master, ask, Vec::new()).map_err(of_sdo)?;
     session.write(&data_type.show(&value)?)
 }
@@ -86,7 +86,7 @@ pub(super) fn data_type(
     master: u32,
     (position, index, sub_index): (u16, u16, u8),
 ) -> Result<DataType, Failure> {
-    let asked = session.tool(master, ToolAsk::Entry { position, index, sub_index });
+    let asked = session.tool(master, ToolQuery::Entry { position, index, sub_index });
     let entry = match asked {
         Ok(ToolAnswer::Entry(entry)) => entry,
         // It was answered that the dictionary does not tell; other failures are those of the daemon.

@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use ringcat::daemon::{Ask, Client};
+use ringcat::daemon::{Client, Query};
 
 use crate::callgrind::{self, cost_beside};
 use crate::segment::Bench;
@@ -42,7 +42,7 @@ impl Crowd {
             if self.is_over.load(Ordering::Acquire) {
                 return;
             }
-            let count = match client.ask(0, Ask::AlStatus { position: (round % 4) as u16 }, Vec::new()) {
+            let count = match client.ask(0, Query::AlStatus { position: (round % 4) as u16 }, Vec::new()) {
                 Ok(_) => &self.answered,
                 Err(_) => &self.refused,
             };

@@ -9,7 +9,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use ringcat::Activity;
-use ringcat::daemon::{Answer, Ask, Client};
+use ringcat::daemon::{Answer, Client, Query};
 use ringcat::piped::segment::PipedSegment;
 use ringcat::sim::network::Network;
 use ringcat::sim::segment::Segment;
@@ -60,7 +60,7 @@ impl Bench {
         let begin = Instant::now();
         let mut client = Client::connect(&bench.socket, "bench").expect("the daemon listens");
         let mut is_scanned = || {
-            let asked = client.ask(0, Ask::State, Vec::new());
+            let asked = client.ask(0, Query::State, Vec::new());
             matches!(asked, Ok((Answer::State(state), _))
                 if state.activity == Activity::Scanned && state.subdevices.len() == count)
         };

@@ -14,7 +14,7 @@ use crate::types::{MasterInfo, PdoEntryInfo, PdoInfo, ScanProgress, SegmentState
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_master(handle: *mut ec_master_t, master_info: *mut MasterInfo) -> c_int {
     let ask = |MasterObject(owner): &MasterObject| {
-        let info = master(&*owner.master.door()?, owner.master.application_time())?;
+        let info = master(&*owner.master.responder()?, owner.master.application_time())?;
         // SAFETY: memory for the result, or NULL (ecrt.h).
         unsafe { put(master_info, info) }
     };
@@ -25,7 +25,7 @@ unsafe extern "C" fn ecrt_master(handle: *mut ec_master_t, master_info: *mut Mas
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_master_scan_progress(handle: *mut ec_master_t, progress: *mut ScanProgress) -> c_int {
     // SAFETY: a handle of the library, memory for the result or NULL (ecrt.h).
-    unsafe { call(handle, |master| put(progress, scan_progress(&*master.0.master.door()?)?)) }
+    unsafe { call(handle, |master| put(progress, scan_progress(&*master.0.master.responder()?)?)) }
 }
 
 #[unsafe(no_mangle)]
@@ -66,7 +66,7 @@ unsafe extern "C" fn ecrt_master_get_slave(
     slave_info: *mut SlaveInfo,
 ) -> c_int {
     // SAFETY: a handle of the library, memory for the result or NULL (ecrt.h).
-    unsafe { call(handle, |master| put(slave_info, slave(&*master.0.master.door()?, slave_position)?)) }
+    unsafe { call(handle, |master| put(slave_info, slave(&*master.0.master.responder()?, slave_position)?)) }
 }
 
 #[unsafe(no_mangle)]
@@ -77,7 +77,9 @@ unsafe extern "C" fn ecrt_master_get_sync_manager(
     sync: *mut SyncInfo,
 ) -> c_int {
     // SAFETY: a handle of the library, memory for the result or NULL (ecrt.h).
-    unsafe { call(handle, |master| put(sync, sync_manager(&*master.0.master.door()?, slave_position, sync_index)?)) }
+    unsafe {
+        call(handle, |master| put(sync, sync_manager(&*master.0.master.responder()?, slave_position, sync_index)?))
+    }
 }
 
 #[unsafe(no_mangle)]
@@ -89,7 +91,7 @@ unsafe extern "C" fn ecrt_master_get_pdo(
     result: *mut PdoInfo,
 ) -> c_int {
     // SAFETY: a handle of the library, memory for the result or NULL (ecrt.h).
-    unsafe { call(handle, |master| put(result, pdo(&*master.0.master.door()?, slave_position, sync_index, pos)?)) }
+    unsafe { call(handle, |master| put(result, pdo(&*master.0.master.responder()?, slave_position, sync_index, pos)?)) }
 }
 
 #[unsafe(no_mangle)]
@@ -102,7 +104,7 @@ unsafe extern "C" fn ecrt_master_get_pdo_entry(
     result: *mut PdoEntryInfo,
 ) -> c_int {
     let ask = |MasterObject(owner): &MasterObject| {
-        let found = entry(&*owner.master.door()?, slave_position, sync_index, pdo_pos, entry_pos)?;
+        let found = entry(&*owner.master.responder()?, slave_position, sync_index, pdo_pos, entry_pos)?;
         // SAFETY: memory for the result, or NULL (ecrt.h).
         unsafe { put(result, found) }
     };

@@ -54,7 +54,7 @@ unsafe extern "C" fn ecrt_master_sdo_download(
         // SAFETY: data of C of this size, memory for the abort code or NULL (ecrt.h).
         unsafe {
             let data = bytes(data, data_size)?.to_vec();
-            finish(download(&*owner.master.door()?, slave_position, (index, Some(subindex)), data), abort_code)
+            finish(download(&*owner.master.responder()?, slave_position, (index, Some(subindex)), data), abort_code)
         }
     };
     // SAFETY: a handle of the library (ecrt.h).
@@ -74,7 +74,7 @@ unsafe extern "C" fn ecrt_master_sdo_download_complete(
         // SAFETY: data of C of this size, memory for the abort code or NULL (ecrt.h).
         unsafe {
             let data = bytes(data, data_size)?.to_vec();
-            finish(download(&*owner.master.door()?, slave_position, (index, None), data), abort_code)
+            finish(download(&*owner.master.responder()?, slave_position, (index, None), data), abort_code)
         }
     };
     // SAFETY: a handle of the library (ecrt.h).
@@ -93,7 +93,7 @@ unsafe extern "C" fn ecrt_master_sdo_upload(
     abort_code: *mut u32,
 ) -> c_int {
     let read = |MasterObject(owner): &MasterObject| -> Outcome {
-        let done = upload(&*owner.master.door()?, slave_position, index, subindex);
+        let done = upload(&*owner.master.responder()?, slave_position, index, subindex);
         // SAFETY: memory of C for data, size and abort code (ecrt.h).
         unsafe { give(&finish(done, abort_code)?, target, target_size, result_size) }
     };
@@ -115,7 +115,7 @@ unsafe extern "C" fn ecrt_master_write_idn(
         // SAFETY: data of C of this size, memory for the error code or NULL (ecrt.h).
         unsafe {
             let data = bytes(data, data_size)?.to_vec();
-            finish(write_idn(&*owner.master.door()?, slave_position, drive_no, idn, data), error_code)
+            finish(write_idn(&*owner.master.responder()?, slave_position, drive_no, idn, data), error_code)
         }
     };
     // SAFETY: a handle of the library (ecrt.h).
@@ -134,7 +134,7 @@ unsafe extern "C" fn ecrt_master_read_idn(
     error_code: *mut u16,
 ) -> c_int {
     let read = |MasterObject(owner): &MasterObject| -> Outcome {
-        let done = read_idn(&*owner.master.door()?, slave_position, drive_no, idn);
+        let done = read_idn(&*owner.master.responder()?, slave_position, drive_no, idn);
         // SAFETY: memory of C for data, size and error code (ecrt.h).
         unsafe { give(&finish(done, error_code)?, target, target_size, result_size) }
     };

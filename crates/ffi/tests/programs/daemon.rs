@@ -90,12 +90,12 @@ impl Bench {
         }
     }
 
-    /// Waits until the links were connected after that time: by the program or by the daemon after it. A program
+    /// Waits until the links have been connected since that time, by the program or by the daemon after it. A program
     /// that has ended may have left its SubDevices in PREOP before the daemon has the bus.
     pub fn wait_for_connection_after(&self, before_ns: u64) {
         let begin = Instant::now();
         while self.connected_ns() <= before_ns {
-            assert!(begin.elapsed() < LONG, "nothing has connected the links");
+            assert!(begin.elapsed() < LONG, "the links are not connected again");
             std::thread::sleep(Duration::from_millis(1));
         }
     }

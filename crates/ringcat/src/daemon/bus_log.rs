@@ -143,7 +143,7 @@ fn sample(supervisor: &SupervisorThread, live: &LiveStatus, is_last: bool) -> Op
         let (is_up, responding, al_states) = (segment.is_up, segment.responding, segment.al_states);
         return Some(Sample { is_up, responding, al_states });
     }
-    let seen = serving::look(supervisor).ok()?;
+    let seen = serving::overview(supervisor).ok()?;
     Some(Sample { is_up: seen.is_up.contains(&true), responding: seen.responding(), al_states: seen.al_states })
 }
 

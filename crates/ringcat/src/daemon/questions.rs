@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use ringcat_control::Connection;
-use ringcat_control::message::{Answer, Ask, Content, Message, Numbered, ToolAsk};
+use ringcat_control::message::{Answer, Content, Message, Numbered, Query, ToolQuery};
 use ringcat_control::refusal::Refusal;
 
 use super::serving::answer;
@@ -22,7 +22,7 @@ const QUICK: usize = 1;
 /// Questions that wait for a thread. The daemon has no more under way.
 const WAITING: usize = 16;
 
-type Question = (Numbered<Ask>, Vec<u8>);
+type Question = (Numbered<Query>, Vec<u8>);
 
 /// Where questions are put. The threads end when it is dropped.
 #[derive(Debug)]
@@ -68,7 +68,7 @@ impl Questions {
     }
 
     /// Takes a question, and says so.
-    pub fn take(&self, question: Numbered<Ask>, bytes: Vec<u8>) {
+    pub fn take(&self, question: Numbered<Query>, bytes: Vec<u8>) {
         let (id, master) = (question.id, question.master);
         let queue = if is_quick(&question.what) { &self.quick } else { &self.slow };
         match queue.try_send((question, bytes)) {
@@ -82,17 +82,20 @@ impl Questions {
 }
 
 /// Whether no mailbox and no procedure is needed for the answer.
-fn is_quick(ask: &Ask) -> bool {
+fn is_quick(ask: &Query) -> bool {
     matches!(
         ask,
-        Ask::State
-            | Ask::Events { .. }
-            | Ask::AlStatus { .. }
-            | Ask::RegisterRead { .. }
-            | Ask::RegisterWrite { .. }
-            | Ask::Look
-            | Ask::Tool(
-                ToolAsk::Master | ToolAsk::SubDevices { .. } | ToolAsk::Description { .. } | ToolAsk::Ports { .. }
+        Query::State
+            | Query::Events { .. }
+            | Query::AlStatus { .. }
+            | Query::RegisterRead { .. }
+            | Query::RegisterWrite { .. }
+            | Query::Overview
+            | Query::Tool(
+                ToolQuery::Master
+                    | ToolQuery::SubDevices { .. }
+                    | ToolQuery::Description { .. }
+                    | ToolQuery::Ports { .. }
             )
     )
 }

@@ -78,7 +78,7 @@ impl Receiver {
     /// Takes a message; false if it was the last one.
     fn take(&self, message: Message, descriptor: Option<OwnedFd>) -> bool {
         match message.content {
-            Content::Ask(question) => self.questions.take(question, message.bytes),
+            Content::Query(question) => self.questions.take(question, message.bytes),
             Content::Interface { name, fault } => {
                 let made = fault.map_or_else(|| descriptor.ok_or_else(|| "no descriptor came".to_owned()), Err);
                 self.ethernet.answered(name, made);

@@ -4,16 +4,16 @@
 //! Every number in a question is checked here. Waits until the answer is there.
 
 mod faults;
-mod look;
+mod overview;
 
-use ringcat_control::message::{Answer, Ask, EventLine};
+use ringcat_control::message::{Answer, EventLine, Query};
 use ringcat_control::refusal::Refusal;
 use ringcat_wire::address::{Position, RegisterAddress};
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::soe::Idn;
 
 use self::faults::{LIMIT, expected};
-pub use self::look::look;
+pub use self::overview::overview;
 use super::refusing::refusal;
 use super::tool;
 use crate::error::Error;
@@ -33,48 +33,48 @@ const MOST_REGISTERS: usize = 1024;
 ///
 /// # Errors
 /// The question is wrong, or it failed.
-pub fn answer(supervisor: &SupervisorThread, ask: Ask, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), Refusal> {
+pub fn answer(supervisor: &SupervisorThread, ask: Query, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), Refusal> {
     let done = |(): ()| (Answer::Done, Vec::new());
     let data = |bytes: Vec<u8>| (Answer::Data, bytes);
     let subdevice = |position: u16| supervisor.subdevice(Position(position)).within(LIMIT);
     let largest = TransferLimits::default().with_bytes(MOST_VALUE);
     let result = match ask {
-        Ask::Tool(ask) => return tool::answer(supervisor, ask, bytes),
-        Ask::Masters => return Err(expected("a question about one master")),
-        Ask::State => supervisor.snapshot().map(|state| (Answer::State(Box::new(state)), Vec::new())),
-        Ask::Events { from } => events(supervisor, from).map(|events| (events, Vec::new())),
-        Ask::AlStatus { position } => subdevice(position)
+        Query::Tool(ask) => return tool::answer(supervisor, ask, bytes),
+        Query::Masters => return Err(expected("a question about one master")),
+        Query::State => supervisor.snapshot().map(|state| (Answer::State(Box::new(state)), Vec::new())),
+        Query::Events { from } => events(supervisor, from).map(|events| (events, Vec::new())),
+        Query::AlStatus { position } => subdevice(position)
             .state()
             .map(|it| (Answer::AlStatus { status: it.status.bits(), code: it.code.0 }, Vec::new())),
-        Ask::SdoUpload { position, index, sub_index } => match sub_index {
+        Query::SdoUpload { position, index, sub_index } => match sub_index {
             Some(sub_index) => subdevice(position).sdo_read::<Vec<u8>>(index, sub_index),
             None => subdevice(position).sdo_read_complete(index),
         }
         .map(data),
-        Ask::SdoDownload { position, index, sub_index } => match sub_index {
+        Query::SdoDownload { position, index, sub_index } => match sub_index {
             Some(sub_index) => subdevice(position).sdo_write(index, sub_index, bytes),
             None => subdevice(position).sdo_write_complete(index, bytes),
         }
         .map(done),
-        Ask::RegisterRead { position, address, length } => {
+        Query::RegisterRead { position, address, length } => {
             let length = registers(usize::from(length))?;
             subdevice(position).register_read_bytes(RegisterAddress(address), length).map(data)
         }
-        Ask::RegisterWrite { position, address } => {
+        Query::RegisterWrite { position, address } => {
             registers(bytes.len())?;
             subdevice(position).register_write(RegisterAddress(address), bytes).map(done)
         }
-        Ask::SiiRead { position } => subdevice(position).sii_read().map(data),
-        Ask::RequestState { position, state } => {
+        Query::SiiRead { position } => subdevice(position).sii_read().map(data),
+        Query::RequestState { position, state } => {
             let state = AlState::from_code(state).ok_or_else(|| expected("a state: 1, 2, 3, 4 or 8"))?;
             subdevice(position).request_state(state).map(done)
         }
-        Ask::Rescan => supervisor.rescan(LIMIT).map(|_| (Answer::Done, Vec::new())),
-        Ask::Look => look(supervisor).map(|look| (Answer::Look(look), Vec::new())),
-        Ask::IdnRead { position, drive, idn } => {
+        Query::Rescan => supervisor.rescan(LIMIT).map(|_| (Answer::Done, Vec::new())),
+        Query::Overview => overview(supervisor).map(|overview| (Answer::Overview(overview), Vec::new())),
+        Query::IdnRead { position, drive, idn } => {
             subdevice(position).limits(largest).soe_read::<Vec<u8>>(faults::drive(drive)?, Idn(idn)).map(data)
         }
-        Ask::IdnWrite { position, drive, idn } => {
+        Query::IdnWrite { position, drive, idn } => {
             subdevice(position).soe_write(faults::drive(drive)?, Idn(idn), bytes).map(done)
         }
         _ => return Err(expected("a question that this version knows")),

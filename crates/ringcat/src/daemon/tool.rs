@@ -11,7 +11,7 @@ mod subdevices;
 
 use ringcat_control::message::Answer;
 use ringcat_control::refusal::Refusal;
-use ringcat_control::tool::{IpParameters, ToolAnswer, ToolAsk};
+use ringcat_control::tool::{IpParameters, ToolAnswer, ToolQuery};
 use ringcat_engine::config::IpSettings;
 use ringcat_engine::event::{LogFilter, LogLevel};
 use ringcat_engine::mail::eoe;
@@ -38,42 +38,44 @@ const PORT: u8 = 0;
 ///
 /// # Errors
 /// The question is wrong, or it failed.
-pub(super) fn answer(supervisor: &SupervisorThread, ask: ToolAsk, bytes: Vec<u8>) -> Answered {
+pub(super) fn answer(supervisor: &SupervisorThread, ask: ToolQuery, bytes: Vec<u8>) -> Answered {
     let at = |position: u16| subdevice(supervisor, position);
     let told = match ask {
-        ToolAsk::Master => master::report(supervisor).map(|report| ToolAnswer::Master(Box::new(report))),
-        ToolAsk::SubDevices { from } => subdevices::list(supervisor, from).map(ToolAnswer::SubDevices),
-        ToolAsk::Description { position } => {
+        ToolQuery::Master => master::report(supervisor).map(|report| ToolAnswer::Master(Box::new(report))),
+        ToolQuery::SubDevices { from } => subdevices::list(supervisor, from).map(ToolAnswer::SubDevices),
+        ToolQuery::Description { position } => {
             return subdevices::describe(supervisor, position)
                 .map(|it| (Answer::Tool(ToolAnswer::Description(Box::new(it))), Vec::new()));
         }
-        ToolAsk::Ports { from, most } => subdevices::ports(supervisor, from, most).map(ToolAnswer::Ports),
-        ToolAsk::Objects { position } => dictionary::objects(supervisor, position).map(ToolAnswer::Objects),
-        ToolAsk::Object { position, index } => dictionary::object(supervisor, position, index).map(ToolAnswer::Object),
-        ToolAsk::Entry { position, index, sub_index } => {
+        ToolQuery::Ports { from, most } => subdevices::ports(supervisor, from, most).map(ToolAnswer::Ports),
+        ToolQuery::Objects { position } => dictionary::objects(supervisor, position).map(ToolAnswer::Objects),
+        ToolQuery::Object { position, index } => {
+            dictionary::object(supervisor, position, index).map(ToolAnswer::Object)
+        }
+        ToolQuery::Entry { position, index, sub_index } => {
             at(position).sdo_entry(index, sub_index).map(|entry| ToolAnswer::Entry(dictionary::line(entry)))
         }
-        ToolAsk::Declared { from } => application::declared(supervisor, from).map(ToolAnswer::Declared),
-        ToolAsk::Domains => return application::domains(supervisor),
-        ToolAsk::Ethernet => master::ethernet(supervisor).map(ToolAnswer::Ethernet),
+        ToolQuery::Declared { from } => application::declared(supervisor, from).map(ToolAnswer::Declared),
+        ToolQuery::Domains => return application::domains(supervisor),
+        ToolQuery::Ethernet => master::ethernet(supervisor).map(ToolAnswer::Ethernet),
         other => return act(supervisor, other, bytes),
     };
     told.map(|answer| (Answer::Tool(answer), Vec::new())).map_err(|error| refusal(&error))
 }
 
 /// What reads or writes data.
-fn act(supervisor: &SupervisorThread, ask: ToolAsk, bytes: Vec<u8>) -> Answered {
+fn act(supervisor: &SupervisorThread, ask: ToolQuery, bytes: Vec<u8>) -> Answered {
     let at = |position: u16| subdevice(supervisor, position);
     let done = match ask {
-        ToolAsk::FileRead { position, name } => return files::read(supervisor, position, name),
-        ToolAsk::FilePart { transfer, offset } => return files::part(transfer, offset, bytes),
-        ToolAsk::FileWrite { position, name, transfer } => return files::write(supervisor, position, name, transfer),
-        ToolAsk::SiiWrite { position, force } => at(position).within(LONG).sii_write(bytes, force).map(|_| ()),
-        ToolAsk::AliasWrite { position, alias, force } => at(position).write_alias(alias, force).map(|_| ()),
-        ToolAsk::StartState { position, state } => return start_state(supervisor, position, state),
-        ToolAsk::UrgentWrite { position, address } => return write_urgently(supervisor, position, address, bytes),
-        ToolAsk::SetIp { position, ip } => return set_ip(supervisor, position, ip),
-        ToolAsk::SetDebugLevel { level } => supervisor.set_log_filter(LogFilter::new(LogLevel::from_number(level))),
+        ToolQuery::FileRead { position, name } => return files::read(supervisor, position, name),
+        ToolQuery::FilePart { transfer, offset } => return files::part(transfer, offset, bytes),
+        ToolQuery::FileWrite { position, name, transfer } => return files::write(supervisor, position, name, transfer),
+        ToolQuery::SiiWrite { position, force } => at(position).within(LONG).sii_write(bytes, force).map(|_| ()),
+        ToolQuery::AliasWrite { position, alias, force } => at(position).write_alias(alias, force).map(|_| ()),
+        ToolQuery::StartState { position, state } => return start_state(supervisor, position, state),
+        ToolQuery::UrgentWrite { position, address } => return write_urgently(supervisor, position, address, bytes),
+        ToolQuery::SetIp { position, ip } => return set_ip(supervisor, position, ip),
+        ToolQuery::SetDebugLevel { level } => supervisor.set_log_filter(LogFilter::new(LogLevel::from_number(level))),
         _ => return Err(expected("a question that this version knows")),
     };
     finished(done)

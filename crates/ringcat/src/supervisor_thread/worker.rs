@@ -20,6 +20,7 @@ use crate::link_figures::AcyclicSamples;
 use crate::links::Links;
 use crate::not_ready::Failures;
 use crate::observer::Observed;
+use crate::of_two::OfTwo;
 use crate::window::Window;
 
 /// Longest sleep while tasks read queues that do not end a sleep, or while links have no waker.
@@ -93,6 +94,7 @@ impl Published {
 pub(super) struct Worker<L> {
     links: L,
     engine: Engine,
+    of_two: OfTwo,
     window: Arc<Window>,
     asked: Vec<Request>,
     tasks: Vec<(Attention, Task)>,
@@ -112,7 +114,7 @@ pub(super) struct Worker<L> {
 impl<L: Links> Worker<L> {
     pub(super) fn new(
         links: L,
-        engine: Engine,
+        (engine, of_two): (Engine, OfTwo),
         window: Arc<Window>,
         events: Sender<TimedEvent>,
         published: Arc<Published>,
@@ -121,6 +123,7 @@ impl<L: Links> Worker<L> {
             has_waker: links.waker().is_some(),
             links,
             engine,
+            of_two,
             window,
             asked: Vec::new(),
             tasks: Vec::new(),
@@ -137,13 +140,8 @@ impl<L: Links> Worker<L> {
     pub(super) fn run(mut self, incoming: &Receiver<Request>) {
         loop {
             let now = self.links.now();
-            let Worker { links, engine, .. } = &mut self;
-            let mut has_work = false;
-            while links.receive(&mut |link, frame| {
-                engine.receive(link, frame, now);
-            }) {
-                has_work = true;
-            }
+            let Worker { links, engine, of_two, .. } = &mut self;
+            let has_work = of_two.take_in(links, engine, now);
             loop {
                 match incoming.try_recv() {
                     Ok(request) => self.asked.push(request),

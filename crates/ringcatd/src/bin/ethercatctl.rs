@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use clap::{Parser, ValueEnum};
 use ringcat_control::Client;
 use ringcat_control::client::ClientError;
-use ringcat_control::message::{Answer, Ask, MasterState};
+use ringcat_control::message::{Answer, MasterState, Query};
 use ringcat_control::socket::to_listen_at;
 use ringcat_link::process::{wait_readable, watch};
 use ringcatd::conf::Conf;
@@ -136,7 +136,7 @@ fn status(conf: &Path) -> Result<ExitCode, String> {
         return Ok(ExitCode::from(NOT_RUNNING));
     };
     println!("ringcatd runs (process {})", client.daemon_pid());
-    let Ok((Answer::Masters(masters), _)) = client.ask(0, Ask::Masters, Vec::new()) else {
+    let Ok((Answer::Masters(masters), _)) = client.ask(0, Query::Masters, Vec::new()) else {
         return Err("ringcatd does not say which masters it has".to_owned());
     };
     for MasterState { master, links, owner, fault } in masters {

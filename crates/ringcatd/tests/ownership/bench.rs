@@ -15,7 +15,7 @@ use ringcat::piped::segment::PipedSegment;
 use ringcat::sim::network::Network;
 use ringcat::sim::segment::Segment;
 use ringcat::{Activity, AlState, AlStatus, Options};
-use ringcat_control::{Answer, Ask};
+use ringcat_control::{Answer, Query};
 use ringcatd::daemon::Daemon;
 use ringcatd::master::{Master, Settings};
 use ringcatd::rights::Rights;
@@ -113,7 +113,7 @@ impl Bench {
     /// Waits until the daemon has the bus and knows so many SubDevices.
     pub fn wait_until_scanned(&self, count: usize) {
         self.wait_until("scanned", |bench| {
-            let Answer::State(state) = ask(&mut bench.client(), Ask::State) else { return false };
+            let Answer::State(state) = ask(&mut bench.client(), Query::State) else { return false };
             state.activity == Activity::Scanned && state.subdevices.len() == count
         });
     }
@@ -188,7 +188,7 @@ impl Drop for Bench {
 
 /// An answer that is not data. SubDevices may be in PREOP before the daemon answers for the master, after the end of an
 /// application.
-pub fn ask(client: &mut Client, ask: Ask) -> Answer {
+pub fn ask(client: &mut Client, ask: Query) -> Answer {
     client.ask_patiently(0, &ask, &[]).expect("it is answered").0
 }
 

@@ -4,7 +4,7 @@ use std::os::unix::process::CommandExt;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use ringcat::daemon::{Answer, Ask, Client, ClientError, Right};
+use ringcat::daemon::{Answer, Client, ClientError, Query, Right};
 use ringcat::{Activity, AlState};
 use ringcat_control::Refusal;
 
@@ -14,19 +14,19 @@ use crate::owner_process::{OwnerProcess, Work};
 /// Position of a drive, with a mailbox.
 const DRIVE: u16 = 3;
 /// Vendor in the identity object.
-const VENDOR: Ask = Ask::SdoUpload { position: DRIVE, index: 0x1018, sub_index: Some(1) };
+const VENDOR: Query = Query::SdoUpload { position: DRIVE, index: 0x1018, sub_index: Some(1) };
 
 /// All questions that read, with the same answers whatever drives the bus.
 fn read_all(client: &mut Client, al_state: u16) -> Vec<Vec<u8>> {
-    let Answer::State(state) = ask(client, Ask::State) else { panic!("it is a state") };
+    let Answer::State(state) = ask(client, Query::State) else { panic!("it is a state") };
     assert_eq!(state.subdevices.len(), 4);
     let expected = if al_state == 8 { Activity::Active } else { Activity::Scanned };
     assert_eq!(state.activity, expected);
-    let Answer::Events { next, events, .. } = ask(client, Ask::Events { from: 0 }) else { panic!("they are events") };
+    let Answer::Events { next, events, .. } = ask(client, Query::Events { from: 0 }) else { panic!("they are events") };
     assert!(next > 0 && !events.is_empty() && events.iter().all(|event| !event.text.is_empty()));
-    assert_eq!(ask(client, Ask::AlStatus { position: DRIVE }), Answer::AlStatus { status: al_state, code: 0 });
-    let registers = Ask::RegisterRead { position: DRIVE, address: 0x0130, length: 2 };
-    let reads = [VENDOR, registers, Ask::SiiRead { position: 0 }];
+    assert_eq!(ask(client, Query::AlStatus { position: DRIVE }), Answer::AlStatus { status: al_state, code: 0 });
+    let registers = Query::RegisterRead { position: DRIVE, address: 0x0130, length: 2 };
+    let reads = [VENDOR, registers, Query::SiiRead { position: 0 }];
     let data = reads.map(|what| client.ask(0, what, Vec::new()).expect("it is read"));
     assert!(data.iter().all(|(answer, bytes)| *answer == Answer::Data && !bytes.is_empty()));
     assert_eq!(data[1].1, [al_state as u8, 0]);
@@ -43,7 +43,7 @@ fn questions_have_the_same_answers_whichever_process_drives_the_bus() {
     let owner = OwnerProcess::start(&bench.socket, Work::Patient);
     let active = read_all(&mut client, 8);
     assert_eq!((&idle[0], &idle[2]), (&active[0], &active[2]));
-    let Answer::Masters(masters) = ask(&mut client, Ask::Masters) else { panic!("they are masters") };
+    let Answer::Masters(masters) = ask(&mut client, Query::Masters) else { panic!("they are masters") };
     let by = masters[0].owner.as_ref().expect("an application drives it");
     assert_eq!((by.pid, by.program.as_str()), (owner.child.id(), "application"));
     owner.end();
@@ -57,25 +57,25 @@ fn questions_have_the_same_answers_whichever_process_drives_the_bus() {
 fn changes_arrive_in_the_subdevice_and_wrong_questions_have_one_sentence() {
     let bench = Bench::start(4);
     let mut client = bench.client();
-    let state = Ask::RequestState { position: 1, state: AlState::SafeOp.code() };
+    let state = Query::RequestState { position: 1, state: AlState::SafeOp.code() };
     assert_eq!(ask(&mut client, state), Answer::Done);
     assert_eq!(bench.states()[1].al_state(), Some(AlState::SafeOp));
-    let write = Ask::RegisterWrite { position: 0, address: 0x0400 };
+    let write = Query::RegisterWrite { position: 0, address: 0x0400 };
     client.ask(0, write.clone(), vec![0xC2, 0x09]).expect("it is written");
-    let read = Ask::RegisterRead { position: 0, address: 0x0400, length: 2 };
+    let read = Query::RegisterRead { position: 0, address: 0x0400, length: 2 };
     assert_eq!(client.ask(0, read, Vec::new()).expect("it is read").1, [0xC2, 0x09]);
-    assert_eq!(ask(&mut client, Ask::Rescan), Answer::Done);
-    let mut refused = |master, what: Ask, bytes: Vec<u8>| match client.ask(master, what, bytes) {
+    assert_eq!(ask(&mut client, Query::Rescan), Answer::Done);
+    let mut refused = |master, what: Query, bytes: Vec<u8>| match client.ask(master, what, bytes) {
         Err(ClientError::Refused(refusal)) => refusal.to_string(),
         other => panic!("{other:?}"),
     };
-    assert_eq!(refused(5, Ask::State, Vec::new()), "there is no master 5; there are: 0");
-    let long = Ask::RegisterRead { position: 0, address: 0, length: 1025 };
+    assert_eq!(refused(5, Query::State, Vec::new()), "there is no master 5; there are: 0");
+    let long = Query::RegisterRead { position: 0, address: 0, length: 1025 };
     assert_eq!(refused(0, long, Vec::new()), "expected 1 to 1024 bytes of registers, not 1025");
     assert_eq!(refused(0, write, Vec::new()), "expected 1 to 1024 bytes of registers, not 0");
-    let none = Ask::RequestState { position: 0, state: 7 };
+    let none = Query::RequestState { position: 0, state: 7 };
     assert_eq!(refused(0, none, Vec::new()), "expected a state: 1, 2, 3, 4 or 8");
-    let beyond = refused(0, Ask::AlStatus { position: 4 }, Vec::new());
+    let beyond = refused(0, Query::AlStatus { position: 4 }, Vec::new());
     assert!(beyond.contains('4'), "{beyond}");
 }
 
@@ -113,7 +113,7 @@ fn fifty_clients_at_100_hz_are_answered_beside_an_application_in_op() {
         for round in 0..2 * RATE {
             let at = Duration::from_micros((round * CLIENTS + number) * 1_000_000 / (RATE * CLIENTS));
             std::thread::sleep(at.saturating_sub(begin.elapsed()));
-            match client.ask(0, Ask::AlStatus { position: (round % 4) as u16 }, Vec::new()) {
+            match client.ask(0, Query::AlStatus { position: (round % 4) as u16 }, Vec::new()) {
                 Ok((answer, _)) => assert_eq!(answer, Answer::AlStatus { status: 8, code: 0 }),
                 // The owner has had as many questions as it may have for a second.
                 Err(ClientError::Refused(Refusal::TooManyQuestions { .. })) => refused += 1,
@@ -149,9 +149,9 @@ fn another_user_may_read_and_changes_nothing() {
     if let Ok(socket) = std::env::var(SOCKET) {
         let mut client = Client::connect(socket.as_ref(), "reader").expect("the daemon listens");
         assert_eq!(client.right(), Right::Read);
-        assert!(matches!(ask(&mut client, Ask::State), Answer::State(_)));
+        assert!(matches!(ask(&mut client, Query::State), Answer::State(_)));
         assert!(matches!(client.ask(0, VENDOR, Vec::new()), Ok((Answer::Data, _))));
-        for change in [Ask::Rescan, Ask::RequestState { position: 0, state: 1 }] {
+        for change in [Query::Rescan, Query::RequestState { position: 0, state: 1 }] {
             let refused = client.ask(0, change, Vec::new());
             assert!(matches!(refused, Err(ClientError::Refused(Refusal::ReadOnly))), "{refused:?}");
         }

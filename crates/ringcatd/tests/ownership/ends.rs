@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use ringcat::AlState;
-use ringcat::daemon::{Answer, Ask};
+use ringcat::daemon::{Answer, Query};
 
 use crate::bench::{Bench, LONG, check_bar};
 use crate::owner_process::{OwnerProcess, Work};
@@ -101,7 +101,7 @@ fn an_application_may_be_killed_at_any_moment_of_its_start() {
         owner.child.kill().expect("it runs");
         owner.child.wait().expect("it has ended");
         bench.wait_until("the daemon has it", |bench| {
-            matches!(bench.client().ask(0, Ask::Masters, Vec::new()),
+            matches!(bench.client().ask(0, Query::Masters, Vec::new()),
                 Ok((Answer::Masters(masters), _)) if masters[0].owner.is_none() && masters[0].fault.is_none())
         });
         bench.wait_until("all in PREOP", |bench| bench.are_in(AlState::PreOp));
@@ -123,7 +123,7 @@ fn an_application_that_ends_without_a_release_leaves_the_bus_to_the_daemon() {
         owner.signal(signal);
         wait_for_first_frame(&bench, at);
         bench.wait_until("all in PREOP", |bench| bench.are_in(AlState::PreOp));
-        crate::bench::ask(&mut client, Ask::State);
+        crate::bench::ask(&mut client, Query::State);
     }
     let mut owner = OwnerProcess::start(&bench.socket, Work::Exit);
     let at = now_ns();

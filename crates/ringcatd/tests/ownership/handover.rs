@@ -33,7 +33,7 @@ fn a_bus_of_100_subdevices_is_taken_over_within_20_ms_without_a_scan() {
         assert_eq!(bus.supervisor().with(|engine| engine.subdevices().len()).expect("it runs"), 100);
         bus.release().expect("the daemon takes it");
         assert!(bench.are_in(AlState::PreOp), "no SubDevice has left PREOP");
-        bench.wait_until("scanned", |bench| bench.client().ask(0, ringcat::daemon::Ask::State, Vec::new()).is_ok());
+        bench.wait_until("scanned", |bench| bench.client().ask(0, ringcat::daemon::Query::State, Vec::new()).is_ok());
     }
     let longest = *times.iter().max().expect("there are some");
     let median = median(&mut times);

@@ -6,7 +6,7 @@ use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 
 use ringcat::AlState;
-use ringcat::daemon::{Answer, Ask};
+use ringcat::daemon::{Answer, Query};
 use ringcat_control::{Connection, Content, Limits, Message, Numbered, Refusal};
 use ringcat_link::descriptors;
 use ringcatd::listening::MOST_CLIENTS;
@@ -19,7 +19,7 @@ const SOON: Duration = Duration::from_secs(1);
 
 fn is_answered(bench: &Bench) {
     let begin = Instant::now();
-    assert!(matches!(ask(&mut bench.client(), Ask::State), Answer::State(_)));
+    assert!(matches!(ask(&mut bench.client(), Query::State), Answer::State(_)));
     check_bar("answer beside hostile clients", begin.elapsed(), SOON);
 }
 
@@ -80,7 +80,7 @@ fn clients_that_neither_speak_nor_read_keep_only_their_own_places() {
         let connection = Connection::new(client).expect("a socket");
         if number % 2 == 0 {
             connection.send(&Content::Hello { program: "deaf".to_owned() }.into()).expect("it is read");
-            let state = Content::Ask(Numbered { id: 1, master: 0, what: Ask::State });
+            let state = Content::Query(Numbered { id: 1, master: 0, what: Query::State });
             (0..100).for_each(|_| drop(connection.send(&state.clone().into())));
         }
         silent.push(connection);

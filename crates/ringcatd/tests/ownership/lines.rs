@@ -5,8 +5,8 @@ use std::io::Write;
 use std::os::unix::net::UnixDatagram;
 use std::time::{Duration, Instant};
 
-use ringcat::daemon::Ask;
-use ringcat_control::message::ToolAsk;
+use ringcat::daemon::Query;
+use ringcat_control::message::ToolQuery;
 
 use crate::bench::{LONG, directory, turn};
 use crate::owner_process::{OwnerProcess, Work};
@@ -17,7 +17,7 @@ fn has(lines: &[String], wanted: &str) -> bool {
 }
 
 fn set_debug_level(running: &Running, level: u32) {
-    let ask = Ask::Tool(ToolAsk::SetDebugLevel { level });
+    let ask = Query::Tool(ToolQuery::SetDebugLevel { level });
     running.client().ask(0, ask, Vec::new()).expect("it is set");
 }
 
@@ -65,7 +65,7 @@ fn is_step(line: &str) -> bool {
 fn change(running: &Running, from: usize) -> usize {
     let mut at = from;
     for (state, expected) in [(1, "EtherCAT: Slave states: INIT, PREOP."), (2, "EtherCAT: Slave states: PREOP.")] {
-        running.client().ask(0, Ask::RequestState { position: 0, state }, Vec::new()).expect("it reaches it");
+        running.client().ask(0, Query::RequestState { position: 0, state }, Vec::new()).expect("it reaches it");
         running.wait_for_lines(|lines| has(&lines[at..], expected));
         at += 1 + running.lines()[at..].iter().position(|line| line == expected).expect("it has come");
     }

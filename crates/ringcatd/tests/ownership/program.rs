@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
 use ringcat::Options;
-use ringcat::daemon::{Answer, Ask, Client, OwnedBus};
+use ringcat::daemon::{Answer, Client, OwnedBus, Query};
 
 use crate::bench::{LONG, ask, directory};
 use crate::owner_process::{OwnerProcess, Work};
@@ -20,7 +20,7 @@ fn the_program_drives_several_masters_each_with_a_segment_in_its_own_process() {
     wait_for(&mut client, 0, 3);
     wait_for(&mut client, 1, 5);
     assert_eq!(running.segments().len(), 2);
-    let Answer::Masters(masters) = ask(&mut client, Ask::Masters) else { panic!("they are masters") };
+    let Answer::Masters(masters) = ask(&mut client, Query::Masters) else { panic!("they are masters") };
     assert!(masters.iter().all(|master| master.owner.is_none() && master.fault.is_none()), "{masters:?}");
     let owner = OwnerProcess::start(&running.socket, Work::Cycle);
     wait_for(&mut client, 1, 5);
@@ -57,7 +57,7 @@ fn a_new_daemon_waits_for_the_application_of_a_killed_one_and_names_it() {
         running.kill();
         running.start_again();
         let mut client = running.client();
-        let state = |client: &mut Client| match ask(client, Ask::Masters) {
+        let state = |client: &mut Client| match ask(client, Query::Masters) {
             Answer::Masters(masters) => masters[0].clone(),
             other => panic!("{other:?}"),
         };
@@ -119,7 +119,7 @@ fn a_stopped_daemon_costs_no_application_its_bus_and_a_release_ends_in_time() {
     running.signal("-STOP");
     std::thread::sleep(Duration::from_secs(7));
     running.signal("-CONT");
-    let Answer::Masters(masters) = ask(&mut running.client(), Ask::Masters) else { panic!("they are masters") };
+    let Answer::Masters(masters) = ask(&mut running.client(), Query::Masters) else { panic!("they are masters") };
     assert_eq!(masters[0].owner.as_ref().map(|owner| owner.pid), Some(owner.child.id()));
     running.signal("-STOP");
     let begin = Instant::now();
@@ -155,7 +155,7 @@ fn the_daemon_drives_again_when_threads_can_be_started_again() {
     owner.child.wait().expect("it has ended");
     let begin = Instant::now();
     let fault = loop {
-        let Answer::Masters(masters) = ask(&mut client, Ask::Masters) else { panic!("they are masters") };
+        let Answer::Masters(masters) = ask(&mut client, Query::Masters) else { panic!("they are masters") };
         match &masters[0].fault {
             Some(fault) => break fault.clone(),
             None => assert!(begin.elapsed() < LONG, "{masters:?}"),
@@ -163,7 +163,7 @@ fn the_daemon_drives_again_when_threads_can_be_started_again() {
     };
     println!("without threads: {fault}");
     threads("1000:");
-    let is_driven = |client: &mut Client| client.ask(0, Ask::State, Vec::new()).is_ok();
+    let is_driven = |client: &mut Client| client.ask(0, Query::State, Vec::new()).is_ok();
     while !is_driven(&mut client) {
         assert!(begin.elapsed() < LONG);
         std::thread::sleep(Duration::from_millis(10));

@@ -9,7 +9,7 @@ use std::process::{Child, ChildStderr, Command, Stdio};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use ringcat::daemon::{Answer, Ask, Client, ClientError, Refusal};
+use ringcat::daemon::{Answer, Client, ClientError, Query, Refusal};
 use ringcat_control::message::Snapshot;
 
 use crate::bench::{LONG, copy_program, directory, ring, turn};
@@ -194,7 +194,7 @@ impl Drop for Running {
 
 fn state(client: &mut Client, master: u32) -> Box<Snapshot> {
     loop {
-        match client.ask(master, Ask::State, Vec::new()) {
+        match client.ask(master, Query::State, Vec::new()) {
             Ok((Answer::State(state), _)) => return state,
             // It passes from one process to another.
             Err(ClientError::Refused(Refusal::Changing { .. })) => std::thread::sleep(Duration::from_millis(5)),
@@ -209,7 +209,7 @@ pub fn wait_for(client: &mut Client, master: u32, count: usize) {
     loop {
         let now = state(client, master);
         let is_in_preop = |position| {
-            let status = client.ask(master, Ask::AlStatus { position }, Vec::new());
+            let status = client.ask(master, Query::AlStatus { position }, Vec::new());
             matches!(status, Ok((Answer::AlStatus { status: 2, .. }, _)))
         };
         if now.subdevices.len() == count && (0..count as u16).all(is_in_preop) {

@@ -4,7 +4,7 @@ use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::Command;
 
-use ringcat::daemon::{Answer, Ask, Client, ClientError, Right};
+use ringcat::daemon::{Answer, Client, ClientError, Query, Right};
 use ringcat_control::Refusal;
 use ringcat_link::process::effective_user;
 use ringcatd::rights::Rights;
@@ -27,8 +27,8 @@ fn tried(socket: &Path) -> &'static str {
         Err(ClientError::NotPermitted { .. }) => return "nothing",
         Err(error) => panic!("{error}"),
     };
-    assert!(matches!(ask(&mut client, Ask::State), Answer::State(_)));
-    let register = Ask::RegisterWrite { position: 0, address: 0x0400 };
+    assert!(matches!(ask(&mut client, Query::State), Answer::State(_)));
+    let register = Query::RegisterWrite { position: 0, address: 0x0400 };
     match client.ask(0, register, vec![0xC2, 0x09]) {
         Ok((Answer::Done, _)) => assert_eq!(client.right(), Right::Change),
         Err(ClientError::Refused(Refusal::ReadOnly)) => {

@@ -3,9 +3,9 @@
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use ringcat::daemon::{Answer, Ask};
+use ringcat::daemon::{Answer, Query};
 use ringcat::{Activity, AlState};
-use ringcat_control::message::{ToolAnswer, ToolAsk};
+use ringcat_control::message::{ToolAnswer, ToolQuery};
 
 use crate::bench::{Bench, LINE, RING, ip};
 
@@ -51,7 +51,7 @@ fn stays(bench: &Bench, what: &str, holds: impl Fn(&Bench) -> bool) {
 
 /// Waits until the daemon that runs now has found all SubDevices.
 fn wait_for_scan(bench: &Bench) {
-    let is_scanned = || match bench.client().ask(0, Ask::State, Vec::new()) {
+    let is_scanned = || match bench.client().ask(0, Query::State, Vec::new()) {
         Ok((Answer::State(state), _)) => state.activity == Activity::Scanned && state.subdevices.len() == 3,
         _ => false,
     };
@@ -124,7 +124,7 @@ fn an_interface_that_was_chosen_is_left_when_the_host_begins_to_use_it() {
 
 /// Carriers of the links as what drives the master sees them.
 fn carriers(bench: &Bench) -> Vec<Option<bool>> {
-    match bench.client().ask(0, Ask::Tool(ToolAsk::Master), Vec::new()) {
+    match bench.client().ask(0, Query::Tool(ToolQuery::Master), Vec::new()) {
         Ok((Answer::Tool(ToolAnswer::Master(report)), _)) => report.links.iter().map(|it| it.carrier).collect(),
         _ => Vec::new(),
     }

@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use ringcat::AlState;
-use ringcat::daemon::{Answer, Ask};
+use ringcat::daemon::{Answer, Query};
 use ringcat_link::monotonic;
 
 use crate::bench::{Bench, LINE};
@@ -83,7 +83,9 @@ fn the_daemon_hands_an_interface_over_and_has_it_back() {
     }
     child.kill().expect("it runs");
     child.wait().expect("it has ended");
-    let Ok((Answer::State(state), _)) = bench.client().ask(0, Ask::State, Vec::new()) else { panic!("it is a state") };
+    let Ok((Answer::State(state), _)) = bench.client().ask(0, Query::State, Vec::new()) else {
+        panic!("it is a state")
+    };
     assert_eq!(state.subdevices.len(), 3);
     assert_eq!(state.acyclic.foreign, 0, "no frame of another MainDevice");
 }

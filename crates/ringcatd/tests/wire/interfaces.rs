@@ -4,15 +4,15 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use ringcat::AlState;
-use ringcat::daemon::{Answer, Ask};
-use ringcat_control::message::{ToolAnswer, ToolAsk};
+use ringcat::daemon::{Answer, Query};
+use ringcat_control::message::{ToolAnswer, ToolQuery};
 use ringcat_control::tool::MasterReport;
 
 use crate::bench::{Bench, LINE, RING};
 
 /// What `ethercat master` shows.
 fn report(bench: &Bench) -> Option<Box<MasterReport>> {
-    match bench.client().ask(0, Ask::Tool(ToolAsk::Master), Vec::new()) {
+    match bench.client().ask(0, Query::Tool(ToolQuery::Master), Vec::new()) {
         Ok((Answer::Tool(ToolAnswer::Master(report)), _)) => Some(report),
         _ => None,
     }
@@ -24,15 +24,15 @@ fn wait_for_report(bench: &Bench, what: &str, holds: impl Fn(&MasterReport) -> b
 
 /// SubDevices that answer now on the main and on the redundant link.
 fn counts(bench: &Bench) -> [u16; 2] {
-    match bench.client().ask(0, Ask::Look, Vec::new()) {
-        Ok((Answer::Look(seen), _)) => seen.counts,
+    match bench.client().ask(0, Query::Overview, Vec::new()) {
+        Ok((Answer::Overview(seen), _)) => seen.counts,
         _ => [0; 2],
     }
 }
 
 /// Whether the ring is closed and passes frames in both directions.
 fn is_redundant(bench: &Bench) -> bool {
-    let Ok((Answer::State(state), _)) = bench.client().ask(0, Ask::State, Vec::new()) else { return false };
+    let Ok((Answer::State(state), _)) = bench.client().ask(0, Query::State, Vec::new()) else { return false };
     state.ring.redundant == Some(true)
 }
 

@@ -1,6 +1,8 @@
 //! Messages of the daemon and any bytes: an error, or a message that survives a round trip.
 
-use ringcat_control::message::{Answer, Ask, HandedBus, HandedLink, HandedLinks, Numbered, Right, ToolAnswer, ToolAsk};
+use ringcat_control::message::{
+    Answer, HandedBus, HandedLink, HandedLinks, Numbered, Query, Right, ToolAnswer, ToolQuery,
+};
 use ringcat_control::wire::{decode, encode};
 use ringcat_control::{Content, Limits, Message, Refusal, VERSION};
 
@@ -20,7 +22,7 @@ fn check(bytes: &[u8]) {
 
 /// One message of each kind.
 pub fn seeds() -> Vec<Vec<u8>> {
-    let numbered = |what| Content::Ask(Numbered { id: 1, master: 0, what });
+    let numbered = |what| Content::Query(Numbered { id: 1, master: 0, what });
     let answered = |what| Content::Answer(Numbered { id: 1, master: 0, what });
     let links = HandedLinks {
         main: HandedLink::Interface { name: "eth1".to_owned(), slots: 128, absent_mac: Some([2, 0, 0, 0, 0, 1]) },
@@ -29,9 +31,9 @@ pub fn seeds() -> Vec<Vec<u8>> {
     let contents = [
         Content::Hello { program: "program".to_owned() },
         Content::Welcome { right: Right::Change, pid: 1 },
-        numbered(Ask::SdoUpload { position: 1, index: 0x1018, sub_index: None }),
-        numbered(Ask::Events { from: 7 }),
-        numbered(Ask::Tool(ToolAsk::FileWrite { position: 1, name: "firmware".to_owned(), transfer: 7 })),
+        numbered(Query::SdoUpload { position: 1, index: 0x1018, sub_index: None }),
+        numbered(Query::Events { from: 7 }),
+        numbered(Query::Tool(ToolQuery::FileWrite { position: 1, name: "firmware".to_owned(), transfer: 7 })),
         answered(Ok(Answer::Tool(ToolAnswer::Objects(vec![0x1000, 0x1018])))),
         Content::Underway { id: 1 },
         answered(Ok(Answer::State(Box::default()))),

@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use ringcat::RingState;
-use ringcat::standby::ForwardingCounters;
+use ringcat::standby::{ForwardingCounters, RoleRequest};
+use ringcat::{Instant, RingState};
 
 /// What a MainDevice does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -39,6 +39,30 @@ pub struct Seen {
     pub failure: Option<String>,
     /// Frames of another MainDevice that the ACTIVE has received.
     pub foreign: u64,
+    /// The phase before, and when it ended.
+    pub before: (Phase, Instant),
+    /// Whether the other MainDevice could take over, as the ACTIVE sees it.
+    pub is_other_ready: bool,
+    /// Cycles of an INACTIVE that follows, since it began.
+    pub followed: u64,
+    /// Outputs that an INACTIVE has seen were written so many cycles before, at most.
+    pub oldest_followed: u64,
+    /// Events of MainDevice redundancy, as text.
+    pub events: Vec<String>,
+}
+
+impl Seen {
+    /// What it did at a time that is not long ago.
+    pub fn phase_at(&self, at: Instant) -> Phase {
+        if at < self.before.1 { self.before.0 } else { self.phase }
+    }
+
+    /// It does something else from now on.
+    pub fn begin(&mut self, phase: Phase, now: Instant) {
+        if phase != self.phase {
+            self.before = (std::mem::replace(&mut self.phase, phase), now);
+        }
+    }
 }
 
 /// Shared by a program and the test.
@@ -46,13 +70,14 @@ pub struct Seen {
 pub struct Board {
     seen: Mutex<Seen>,
     is_asked_to_stop: AtomicBool,
+    request: Mutex<Option<RoleRequest>>,
 }
 
 impl Board {
     /// Of a program that begins with this.
     pub fn new(phase: Phase) -> Board {
         let seen = Seen { phase, ..Seen::default() };
-        Board { seen: Mutex::new(seen), is_asked_to_stop: AtomicBool::new(false) }
+        Board { seen: Mutex::new(seen), ..Board::default() }
     }
 
     /// A copy of what was seen.
@@ -63,6 +88,16 @@ impl Board {
     /// Notes something.
     pub fn note(&self, change: impl FnOnce(&mut Seen)) {
         change(&mut self.seen.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+
+    /// The program is to request a role.
+    pub fn ask_for(&self, request: RoleRequest) {
+        *self.request.lock().unwrap_or_else(PoisonError::into_inner) = Some(request);
+    }
+
+    /// Which.
+    pub fn take_request(&self) -> Option<RoleRequest> {
+        self.request.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
     /// The program is to stop in order.

@@ -46,6 +46,8 @@ pub(super) struct Outputs {
     /// The cycle of each frame, and when it was seen first.
     frames: BTreeMap<Frame, (u64, SimTime)>,
     oldest: u32,
+    /// Longest time between outputs that a SubDevice took.
+    longest_gap: Duration,
     checked: u64,
 }
 
@@ -57,7 +59,15 @@ impl Outputs {
     fn of(devices: usize, cycle: Duration) -> Outputs {
         let taken = vec![Taken::default(); devices];
         let cycle_ns = cycle.as_nanos() as u64;
-        Outputs { cycle_ns, max_age: MAX_AGE, taken, frames: BTreeMap::new(), oldest: 0, checked: 0 }
+        Outputs {
+            cycle_ns,
+            max_age: MAX_AGE,
+            taken,
+            frames: BTreeMap::new(),
+            oldest: 0,
+            longest_gap: Duration::ZERO,
+            checked: 0,
+        }
     }
 
     pub(super) fn allow_age(&mut self, cycles: u32) {
@@ -70,6 +80,10 @@ impl Outputs {
 
     pub(super) fn take_oldest(&mut self) -> Duration {
         Duration::from_nanos(self.cycle_ns * u64::from(std::mem::take(&mut self.oldest)))
+    }
+
+    pub(super) fn take_longest_gap(&mut self) -> Duration {
+        std::mem::take(&mut self.longest_gap)
     }
 
     /// When a SubDevice took outputs last.
@@ -95,11 +109,12 @@ impl Outputs {
         for moved in access.moved.iter().filter(|moved| moved.write) {
             let outputs = access.data.get(moved.at..moved.at + moved.len).unwrap_or_default();
             let taken = &mut self.taken[device.0];
-            taken.at = Some(at);
+            let before = taken.at.replace(at);
             // Those of an application that has not written any yet, or does not any more.
             if outputs.iter().all(|byte| *byte == 0) {
                 continue;
             }
+            self.longest_gap = self.longest_gap.max(before.map_or(Duration::ZERO, |before| at - before));
             let (age, name) = (age(outputs, now), device.0);
             let frame = (access.identity, access.frame.0, access.frame.1);
             let is_recent = u32::try_from(age).is_ok_and(|age| age <= self.max_age);

@@ -91,7 +91,7 @@ fn exchange(links: HostLinks, board: &Board) -> Result<(), Error> {
 }
 
 /// The outputs of all SubDevices in the image.
-fn outputs_of(application: &Application<HostLinks>, subdevices: usize) -> Vec<Range<usize>> {
+pub(super) fn outputs_of(application: &Application<HostLinks>, subdevices: usize) -> Vec<Range<usize>> {
     let areas = (0..subdevices).flat_map(|subdevice| application.directory().areas(SubDeviceId(subdevice)));
     let outputs = areas.filter(|area| area.direction == Direction::Outputs);
     outputs

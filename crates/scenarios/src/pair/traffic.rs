@@ -9,7 +9,9 @@ use ringcat_sim::network::host_log::HostFrame;
 use ringcat_sim::time::SimTime;
 use ringcat_wire::source_address::{FORWARDED_ON_MAIN, FORWARDED_ON_REDUNDANT};
 
-use super::board::Phase;
+use ringcat::Instant;
+
+use super::board::{Phase, Seen};
 
 /// Last bytes of the addresses of both hosts that their frames carry.
 const IDENTITIES: [[u8; 3]; 2] = [[0x00, 0x53, 0x01], [0x00, 0x53, 0x11]];
@@ -55,23 +57,23 @@ impl Traffic {
     }
 
     /// Checks what has passed the interfaces.
-    pub(super) fn check(&mut self, frames: Vec<HostFrame>, phases: [Phase; 2]) {
+    pub(super) fn check(&mut self, frames: Vec<HostFrame>, seen: &[Seen; 2]) {
         let Some(last) = frames.last().map(|frame| frame.at) else { return };
         for frame in frames {
-            self.check_frame(&frame, phases);
+            self.check_frame(&frame, seen);
         }
         let limit = self.lifetime * REMEMBERED;
         self.copies.retain(|_, journey| last - journey.begun < limit);
     }
 
-    fn check_frame(&mut self, frame: &HostFrame, phases: [Phase; 2]) {
+    fn check_frame(&mut self, frame: &HostFrame, seen: &[Seen; 2]) {
         let marks = frame.head[6];
         let identity = [frame.head[9], frame.head[10], frame.head[11]];
         let copy = (identity, marks & 0x78, frame.head[7], frame.head[17]);
         let host = frame.link.host();
         let begins = frame.is_sent && identity == IDENTITIES[host as usize];
         if begins {
-            let phase = phases[host as usize];
+            let phase = seen[host as usize].phase_at(Instant(frame.at.0));
             assert_ne!(phase, Phase::Inactive, "an INACTIVE MainDevice sends a frame of its own: {frame:02x?}");
             assert_eq!(marks & (FORWARDED_ON_MAIN | FORWARDED_ON_REDUNDANT), 0, "{frame:02x?}");
             self.copies.insert(copy, Journey { begun: frame.at, passes: [0; 4] });
@@ -121,6 +123,10 @@ mod tests {
     const CYCLE: Duration = Duration::from_millis(1);
     const PHASES: [Phase; 2] = [Phase::Active, Phase::Inactive];
 
+    fn seen(phases: [Phase; 2]) -> [Seen; 2] {
+        phases.map(|phase| Seen { phase, ..Seen::default() })
+    }
+
     /// A frame of the first host with these marks.
     fn frame(us: u64, link: HostLink, is_sent: bool, marks: u8) -> HostFrame {
         let mut head = [0; 26];
@@ -131,7 +137,7 @@ mod tests {
 
     fn check(frames: Vec<HostFrame>) -> u64 {
         let mut traffic = Traffic::new(CYCLE);
-        traffic.check(frames, PHASES);
+        traffic.check(frames, &seen(PHASES));
         traffic.passes()
     }
 
@@ -174,7 +180,7 @@ mod tests {
         for cycle in 0..cycles {
             let mut other = frame(cycle * 1_000 + 400, HostLink::SecondMain, true, 0);
             other.head[9..12].copy_from_slice(&IDENTITIES[1]);
-            traffic.check(vec![frame(cycle * 1_000, HostLink::Main, true, 0), other], [Phase::Active; 2]);
+            traffic.check(vec![frame(cycle * 1_000, HostLink::Main, true, 0), other], &seen([Phase::Active; 2]));
         }
     }
 

@@ -5,8 +5,10 @@ mod adoption;
 mod clocks;
 mod collisions;
 mod following;
+mod library;
 mod rows;
 mod taking_over;
+mod threads;
 
 use std::time::Duration;
 

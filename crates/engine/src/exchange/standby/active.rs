@@ -93,10 +93,10 @@ impl Exchange {
         let now = self.cycle + 1;
         let Some(state) = self.standby.0.as_deref_mut().filter(|it| it.role == MainDeviceRole::Active) else { return };
         let last = core::mem::replace(&mut state.foreign_in, now);
-        if let Some(source) = bytes.get(6..).and_then(<[u8]>::first_chunk)
-            && (last == 0 || now - last > APART)
-        {
-            let source = MacAddress(*source);
+        let Some(source) = bytes.get(6..).and_then(<[u8]>::first_chunk) else { return };
+        let source = MacAddress(*source);
+        state.collided_with = Some(source);
+        if last == 0 || now - last > APART {
             self.events.push(CyclicStandbyEvent::Collision { arrived_on, source }.pack());
         }
     }

@@ -117,7 +117,8 @@ impl State {
     fn become_role(&mut self, role: MainDeviceRole) {
         self.role = role;
         self.watch.forget();
-        (self.foreign_in, self.shown, self.noticed) = (0, None, None);
+        (self.foreign_in, self.collided_with) = (0, None);
+        (self.shown, self.noticed) = (None, None);
         let (identity, item) = (self.following.answer.identity, self.items.first());
         self.following.answer = Answer { identity, item, ..Answer::new() };
         self.control.set(role);

@@ -3,6 +3,8 @@
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 
+use ringcat_wire::frame::MacAddress;
+
 use super::partner::{Items, PartnerWatch};
 use crate::board::standby::StandbyWords;
 use crate::exchange::following::{Following, OutputsSeen};
@@ -59,6 +61,8 @@ pub(in crate::exchange) struct State {
     pub shown: Option<u32>,
     /// Cycle, plus one, in which a frame of another MainDevice came last while this one is ACTIVE.
     pub foreign_in: u64,
+    /// Its sender, until the application has asked for it.
+    pub collided_with: Option<MacAddress>,
     /// A version of the ACTIVE that cannot be read, and was reported.
     pub other_version: Option<u8>,
     /// The newest cycle of the ACTIVE when the last cycle of this MainDevice began.
@@ -80,8 +84,8 @@ impl Standby {
         }
     }
 
-    /// Whether copies of master frames may still come back.
+    /// Whether copies of master frames may still come back, or frames of the other MainDevice may come.
     pub fn awaits_copies(&self) -> bool {
-        self.0.as_ref().is_some_and(|state| state.frames.is_expected())
+        self.0.as_ref().is_some_and(|state| state.role == MainDeviceRole::Inactive || state.frames.is_expected())
     }
 }

@@ -14,7 +14,7 @@ use super::places::wrong_addresses;
 use crate::info::{SiiExtent, SubDeviceInfo};
 use crate::procedures::dictionary::complete;
 use crate::procedures::scan::{
-    Learned, MAX_SUBDEVICES, Said, Scan, ScanError, ScanOptions, ask, connect, describe, read_registers,
+    Identified, Learned, MAX_SUBDEVICES, Scan, ScanError, ScanOptions, ask, connect, describe, read_registers,
 };
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::unassigned::{give, level, view};
@@ -162,9 +162,9 @@ async fn read_new(
         let (cache, station) = (cache.clone(), given.station);
         async move {
             level(&bus, station).await?;
-            let said = ask(&bus, position, station, &cache, SiiExtent::Complete).await?;
-            let said = Said { pdo_source: given.pdo_source(), ..said };
-            Ok::<_, ScanError>(describe(read_registers(&bus, position, station).await?, &said))
+            let identified = ask(&bus, position, station, &cache, SiiExtent::Complete).await?;
+            let identified = Identified { pdo_source: given.pdo_source(), ..identified };
+            Ok::<_, ScanError>(describe(read_registers(&bus, position, station).await?, &identified))
         }
     });
     let subdevices = read.await.into_iter().collect::<Result<Vec<_>, _>>()?;

@@ -13,7 +13,7 @@ use crate::supervisor_thread::SupervisorThread;
 
 /// Longest time for a service of a SubDevice.
 const LIMIT: Duration = Duration::from_secs(20);
-/// Longest time for what waits for flash memory; before the daemon gives up (`Ask::limit`).
+/// Longest time for what waits for flash memory; before the daemon gives up (`Query::limit`).
 pub(super) const LONG: Duration = Duration::from_secs(590);
 
 /// An answer with data that was read.

@@ -123,7 +123,7 @@ fn pdos_are_awaited_of_those_on_their_way_to_a_state_with_mail_only() {
 }
 
 #[test]
-fn a_dictionary_that_is_written_while_the_segment_is_scanned_is_outdated_in_it() {
+fn a_dictionary_that_is_written_during_a_scan_is_outdated_in_what_it_finds() {
     let mut idle = Idle::kept(&THREE);
     let source = |idle: &Idle, at: usize| {
         let found = idle.segment.found().unwrap().subdevices[at].pdo_source;

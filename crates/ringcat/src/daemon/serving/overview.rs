@@ -1,6 +1,6 @@
 //! What is seen of a segment now.
 
-use ringcat_control::message::SegmentLook;
+use ringcat_control::message::SegmentOverview;
 use ringcat_engine::main_device::RawDatagram;
 use ringcat_engine::main_device::snapshot::Activity;
 use ringcat_engine::ring_status::Redundancy;
@@ -19,17 +19,17 @@ const AL_STATES: u8 = 0x0F;
 ///
 /// # Errors
 /// The thread of the acyclic half has ended.
-pub fn look(supervisor: &SupervisorThread) -> Result<SegmentLook, Error> {
+pub fn overview(supervisor: &SupervisorThread) -> Result<SegmentOverview, Error> {
     let asked = supervisor.with(|engine| (engine.ring_status(), engine.snapshot().activity, engine.subdevices().len()));
     let (ring, activity, found) = asked?;
     let read = RawDatagram::new(Command::Brd, Target::Broadcast(map::AL_STATUS), [0; 2]);
     let replies = supervisor.datagrams(vec![read.with_resend(true)]).unwrap_or_default();
-    let mut seen = SegmentLook {
+    let mut seen = SegmentOverview {
         is_ring: ring.redundancy != Redundancy::None,
         found: u32::try_from(found).unwrap_or(u32::MAX),
         is_scanned: matches!(activity, Activity::Scanned | Activity::Active),
         scans: activity == Activity::Scanning,
-        ..SegmentLook::default()
+        ..SegmentOverview::default()
     };
     if let Some(Ok(reply)) = replies.first() {
         seen.counts = [reply.main.0, reply.redundant.0];

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use ringcat::SupervisorThread;
-use ringcat::daemon::{Answer, Ask, Client, ClientError, Refusal, SegmentLook, ServiceFault, serving};
+use ringcat::daemon::{Answer, Client, ClientError, Query, Refusal, SegmentOverview, ServiceFault, serving};
 
 use crate::code::{Code, Outcome};
 use crate::environment::program_name;
@@ -16,30 +16,30 @@ const MOST_DATA: usize = 64 << 10;
 
 /// Where questions about a master are answered.
 #[derive(Debug)]
-pub enum Door {
+pub enum Responder {
     /// By the acyclic half in this process.
     Here(SupervisorThread),
     /// By a daemon, or the application that drives the master.
-    Daemon(DaemonDoor),
+    Daemon(DaemonResponder),
 }
 
 /// A master of a daemon, for questions.
 #[derive(Debug)]
-pub struct DaemonDoor {
+pub struct DaemonResponder {
     socket: PathBuf,
     master: u32,
     /// Connections that no question uses: several threads may ask at once.
     idle: Mutex<Vec<Client>>,
 }
 
-impl DaemonDoor {
+impl DaemonResponder {
     /// Connects to the daemon at this socket.
     ///
     /// # Errors
     /// None answers, or it has no such master.
-    pub fn open(socket: &Path, master: u32) -> Result<DaemonDoor, ClientError> {
+    pub fn open(socket: &Path, master: u32) -> Result<DaemonResponder, ClientError> {
         let mut client = Client::connect(socket, &program_name())?;
-        let (answer, _) = client.ask(master, Ask::Masters, Vec::new())?;
+        let (answer, _) = client.ask(master, Query::Masters, Vec::new())?;
         let present = match answer {
             Answer::Masters(all) => all.into_iter().map(|state| state.master).collect(),
             _ => Vec::new(),
@@ -47,7 +47,7 @@ impl DaemonDoor {
         if !present.contains(&master) {
             return Err(ClientError::Refused(Refusal::NoMaster { master, present }));
         }
-        Ok(DaemonDoor { socket: socket.to_owned(), master, idle: Mutex::new(vec![client]) })
+        Ok(DaemonResponder { socket: socket.to_owned(), master, idle: Mutex::new(vec![client]) })
     }
 
     /// The socket of the daemon.
@@ -60,7 +60,7 @@ impl DaemonDoor {
         self.master
     }
 
-    fn ask(&self, what: &Ask, bytes: &[u8]) -> Result<(Answer, Vec<u8>), Refusal> {
+    fn ask(&self, what: &Query, bytes: &[u8]) -> Result<(Answer, Vec<u8>), Refusal> {
         if bytes.len() > MOST_DATA {
             let text = format!("expected at most {MOST_DATA} bytes of data, got {}", bytes.len());
             return Err(Refusal::Service { fault: ServiceFault::TooLong, text });
@@ -81,15 +81,15 @@ impl DaemonDoor {
     }
 }
 
-impl Door {
+impl Responder {
     /// Asks, and waits for the answer. `bytes` is data to write; with the answer comes data that was read.
     ///
     /// # Errors
     /// What [`code_of`] turns into a return code.
-    pub fn ask(&self, what: Ask, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), Refusal> {
+    pub fn ask(&self, what: Query, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), Refusal> {
         match self {
-            Door::Here(supervisor) => serving::answer(supervisor, what, bytes),
-            Door::Daemon(door) => door.ask(&what, &bytes),
+            Responder::Here(supervisor) => serving::answer(supervisor, what, bytes),
+            Responder::Daemon(responder) => responder.ask(&what, &bytes),
         }
     }
 
@@ -97,9 +97,9 @@ impl Door {
     ///
     /// # Errors
     /// The acyclic half has ended, or the daemon does not answer.
-    pub fn look(&self) -> Outcome<SegmentLook> {
-        match self.ask(Ask::Look, Vec::new()) {
-            Ok((Answer::Look(seen), _)) => Ok(seen),
+    pub fn overview(&self) -> Outcome<SegmentOverview> {
+        match self.ask(Query::Overview, Vec::new()) {
+            Ok((Answer::Overview(seen), _)) => Ok(seen),
             Ok(_) => Err(Code::IO),
             Err(refusal) => Err(code_of(&refusal)),
         }

@@ -1,6 +1,6 @@
 //! Where orders come in: lines of the standard input, and connections to a Unix socket.
 //!
-//! Each of these doors has a thread that reads lines and waits for the answer; the simulator takes orders between two
+//! Each of these sources has a thread that reads lines and waits for the answer; the simulator takes orders between two
 //! events and never waits for them.
 
 use std::io::{self, BufRead, BufReader, Read, Write};
@@ -26,20 +26,20 @@ pub struct Order {
     pub answer: Sender<String>,
 }
 
-/// All doors, and the orders that came in.
+/// All sources of orders, and the orders that came in.
 #[derive(Debug)]
-pub struct Doors {
+pub struct OrderSources {
     orders: Receiver<Order>,
     socket: Option<PathBuf>,
 }
 
-impl Doors {
+impl OrderSources {
     /// Listens to the standard input and, where a path is given, to a Unix socket there. Only the user whose process
     /// this is may connect.
     ///
     /// # Errors
     /// A path that cannot be listened at.
-    pub fn open(socket: Option<&Path>) -> io::Result<Doors> {
+    pub fn open(socket: Option<&Path>) -> io::Result<OrderSources> {
         let (sender, orders) = channel();
         if let Some(path) = socket {
             let listener = listen(path)?;
@@ -47,10 +47,10 @@ impl Doors {
             thread::Builder::new().name("control socket".into()).spawn(move || accept(&listener, &sender))?;
         }
         thread::Builder::new().name("standard input".into()).spawn(move || {
-            // An end of the input, or an error, ends this door and nothing else.
+            // An end of the input, or an error, ends this source and nothing else.
             let _ = serve(io::stdin().lock(), &mut io::stdout(), &sender, output::answer);
         })?;
-        Ok(Doors { orders, socket: socket.map(Path::to_owned) })
+        Ok(OrderSources { orders, socket: socket.map(Path::to_owned) })
     }
 
     /// The oldest order that is waiting.
@@ -59,7 +59,7 @@ impl Doors {
     }
 }
 
-impl Drop for Doors {
+impl Drop for OrderSources {
     fn drop(&mut self) {
         if let Some(path) = &self.socket {
             // It may be gone already.
@@ -134,7 +134,7 @@ fn serve(
 mod tests {
     use super::*;
 
-    /// The output of a door where each order is its own answer.
+    /// The output of a source where each order is its own answer.
     fn echo(input: &[u8]) -> String {
         let (sender, orders) = channel::<Order>();
         let simulator = thread::spawn(move || {

@@ -1,0 +1,69 @@
+//! Takes what an INACTIVE MainDevice without an application hears of the ACTIVE (protocol 9.10).
+//!
+//! It belongs to the thread that has the links of the master frames, which need not be that of the acyclic half: both
+//! share words.
+
+use alloc::sync::Arc;
+use core::time::Duration;
+
+use ringcat_wire::master_frame::{Header, Lengths, NotReady};
+
+use crate::board::standby::StandbyWords;
+use crate::exchange::following::{Following, Unusable};
+use crate::knowledge::Knowledge;
+use crate::link::Link;
+use crate::time::Instant;
+
+/// What an INACTIVE MainDevice has heard of the ACTIVE.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Heard {
+    /// When a frame of another MainDevice came last.
+    pub at: Option<Instant>,
+    /// Period of its cycles; `None` before a master frame.
+    pub period: Option<Duration>,
+    /// All that is needed to follow it has arrived.
+    pub is_known: bool,
+}
+
+/// Takes what an INACTIVE MainDevice without an application hears of the ACTIVE, in any thread.
+#[derive(Debug)]
+pub struct Listener {
+    listening: Following,
+    words: Arc<StandbyWords>,
+}
+
+impl Listener {
+    pub(super) fn new(words: Arc<StandbyWords>) -> Listener {
+        let mut listening = Following::new(Lengths::default(), words.clone());
+        listening.answer.not_ready = NotReady::NO_APPLICATION;
+        Listener { listening, words }
+    }
+
+    /// Takes and fills a received frame of another MainDevice before it is forwarded. Any bytes are allowed. Neither
+    /// allocates nor waits.
+    pub fn fill(&mut self, arrived_on: Link, frame: &mut [u8], now: Instant) {
+        self.words.post_heard(now);
+        self.listening.fill(arrived_on, frame, now);
+        if let Some(Unusable::Version { least, got }) = self.listening.unusable {
+            self.words.post_other_version(least, got);
+        }
+    }
+
+    /// What was heard so far.
+    pub fn heard(&self) -> Heard {
+        let newest = self.listening.newest().and_then(|(cycle, _)| self.listening.header_of(cycle));
+        let period = |(Header { period_ns, .. }, _)| Duration::from_nanos(u64::from(period_ns));
+        Heard {
+            at: self.words.heard_at(),
+            period: newest.map(period).filter(|period| !period.is_zero()),
+            is_known: self.words.header().is_some() && known(&self.words).is_some(),
+        }
+    }
+}
+
+/// Knowledge of the ACTIVE, once all of it has arrived.
+pub(super) fn known(words: &StandbyWords) -> Option<Knowledge> {
+    let (_, bytes) = words.heard.copy()?;
+    Knowledge::from_bytes(&bytes).ok()
+}

@@ -1,0 +1,196 @@
+//! From a controller that knows nothing of its ring to a running application in the role that is free: listening,
+//! following, becoming ACTIVE (protocol 9.10).
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use ringcat_engine::Scan;
+use ringcat_engine::link::Link;
+use ringcat_engine::main_device::{ActivateError, Declaration, Heard};
+use ringcat_engine::role::{RoleControl, RoleRequest};
+use ringcat_engine::time::Instant;
+
+use super::policy::Dice;
+use super::{ForwardingCounters, NeedsTwoLinks, Policy};
+use crate::acyclic::Inline;
+use crate::application::Application;
+use crate::error::Error;
+use crate::links::Links;
+use crate::main_device::{MainDevice, Refused};
+use crate::window::Window;
+
+/// Longest time of listening before it is decided again whether there is an ACTIVE.
+const SLICE: Duration = Duration::from_millis(10);
+
+/// What a MainDevice of two does next, before it has an application.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Next {
+    /// It listens on: nothing is decided.
+    Listen,
+    /// There is an ACTIVE of which all is known: [`MainDevice::follow`].
+    Follow,
+    /// There is no ACTIVE: [`MainDevice::become_active`], and then a scan or [`MainDevice::bring_up`].
+    BecomeActive,
+}
+
+/// Listens before an application begins, and decides how it begins.
+#[derive(Debug)]
+pub struct Joining {
+    takes_over: bool,
+    silent_since: Instant,
+    /// Silence after which this one becomes ACTIVE.
+    limit: Duration,
+}
+
+impl Joining {
+    /// Begins to listen.
+    pub fn begin<L: Links>(main_device: &MainDevice<L>, policy: &Policy) -> Joining {
+        Joining::on(&main_device.links, policy)
+    }
+
+    pub(crate) fn on(links: &impl Links, policy: &Policy) -> Joining {
+        let (main, now) = (links.addresses().main, links.now());
+        let pause = Dice::new(main, now).up_to(policy.listen);
+        Joining { takes_over: policy.takes_over, silent_since: now, limit: policy.listen + pause }
+    }
+
+    /// What follows from what was heard. Without a link that is up nothing can be heard: then it listens on.
+    pub fn next<L: Links>(&mut self, main_device: &MainDevice<L>) -> Next {
+        let has_link = Link::ALL.iter().any(|link| main_device.links.carrier(*link) != Some(false));
+        self.decide(&main_device.heard(), has_link, main_device.now())
+    }
+
+    pub(crate) fn decide(&mut self, heard: &Heard, has_link: bool, now: Instant) -> Next {
+        if !has_link {
+            self.silent_since = now;
+        }
+        self.silent_since = self.silent_since.max(heard.at.unwrap_or_default());
+        let is_silent = now.since(self.silent_since) >= self.limit;
+        match (heard.is_known, is_silent) {
+            (_, true) if self.takes_over => Next::BecomeActive,
+            (true, false) => Next::Follow,
+            _ => Next::Listen,
+        }
+    }
+}
+
+/// In a ring of two MainDevices ([`Options::standby`](crate::Options::standby)).
+impl<L: Links> MainDevice<L> {
+    /// The role, and requests for another one, for any thread.
+    pub fn role_control(&self) -> RoleControl {
+        self.engine().role_control()
+    }
+
+    /// What was heard of the ACTIVE so far.
+    pub fn heard(&self) -> Heard {
+        self.engine().heard()
+    }
+
+    /// Frames that were forwarded so far.
+    pub fn forwarded(&self) -> ForwardingCounters {
+        self.of_two.counters()
+    }
+
+    /// Forwards and listens for a time; less if all is known that is needed to follow.
+    ///
+    /// # Errors
+    /// There is no redundant link.
+    pub fn listen(&mut self, time: Duration) -> Result<Heard, Error> {
+        if self.links.addresses().redundant.is_none() {
+            return Err(NeedsTwoLinks.into());
+        }
+        let end = self.now() + time;
+        while !self.heard().is_known && self.now() < end {
+            self.work();
+            let wake = self.engine().next_deadline().unwrap_or(end);
+            self.links.wait(wake.min(end));
+        }
+        Ok(self.heard())
+    }
+
+    /// Becomes ACTIVE without an application, whatever the other MainDevice does: then a scan, or
+    /// [`MainDevice::bring_up`], is allowed.
+    pub fn become_active(&mut self) {
+        self.role_control().request(RoleRequest::Active);
+        self.work();
+    }
+
+    /// Follows the ACTIVE with an application: nothing is sent before it takes over. `declare` gets what the ACTIVE
+    /// knows of the segment, and returns the declaration, the same as on the ACTIVE.
+    ///
+    /// # Errors
+    /// This MainDevice is ACTIVE, not all is known yet ([`Heard::is_known`]), or the declaration does not fit. The
+    /// error contains the MainDevice for another attempt.
+    pub fn follow(
+        mut self,
+        declare: impl FnOnce(&Scan) -> Declaration,
+    ) -> Result<Application<L>, Box<Refused<MainDevice<L>>>> {
+        let known = self.engine().heard_knowledge().zip(self.engine().heard_configuration());
+        let Some(((knowledge, (session, _)), scan)) = known.zip(self.engine().heard_scan()) else {
+            let error = ActivateError::NoScan.into();
+            return Err(Box::new(Refused { error, main_device: self }));
+        };
+        match self.engine.follow(declare(&scan), knowledge, session) {
+            Ok(active) => {
+                let window = Arc::new(Window::new(self.acyclic_bytes));
+                Ok(Application::new(self.links, Inline::new(self.engine), active, window))
+            }
+            Err(error) => Err(Box::new(Refused { error: error.into(), main_device: self })),
+        }
+    }
+
+    /// Takes the role that is free: follows an ACTIVE as soon as all is known of it, or becomes ACTIVE if none is heard
+    /// for [`Policy::listen`] and a random pause. Forwards meanwhile. With [`Policy::permanent_standby`] it waits for
+    /// an ACTIVE without a limit; [`Joining`] has the same in steps.
+    ///
+    /// ```no_run
+    /// use std::time::Duration;
+    /// use ringcat::packet::{PacketLinks, ReceiveMode};
+    /// use ringcat::standby::{Policy, StandbyOptions};
+    /// use ringcat::{MainDevice, Options, automatic};
+    ///
+    /// let links = PacketLinks::open_forwarding("eth1", "eth2", ReceiveMode::Blocking)?;
+    /// let options = Options::default().with_standby(StandbyOptions::default());
+    /// let cycle = Duration::from_millis(2);
+    /// let main_device = MainDevice::request(links, &options);
+    /// let mut application = main_device.join(&Policy::default(), |scan| automatic(&scan.subdevices, cycle))?;
+    /// loop {
+    ///     application.cycle(|data| {
+    ///         // The same in both roles: what it writes leaves as ACTIVE only.
+    ///     });
+    ///     while let Some(event) = application.pop_event() {
+    ///         println!("{:?}", event.event);
+    ///     }
+    /// }
+    /// # #[allow(unreachable_code)]
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// There is no redundant link; as [`MainDevice::follow`] and [`MainDevice::bring_up`].
+    pub fn join(
+        mut self,
+        policy: &Policy,
+        declare: impl FnOnce(&Scan) -> Declaration,
+    ) -> Result<Application<L>, Box<Refused<MainDevice<L>>>> {
+        let mut joining = Joining::begin(&self, policy);
+        let mut application = loop {
+            if let Err(error) = self.listen(SLICE) {
+                return Err(Box::new(Refused { error, main_device: self }));
+            }
+            match joining.next(&self) {
+                // What was heard is known, and too old to be followed.
+                Next::Listen if self.heard().is_known => self.attend(SLICE),
+                Next::Listen => {}
+                Next::Follow => break self.follow(declare)?,
+                Next::BecomeActive => {
+                    self.become_active();
+                    break self.bring_up(declare)?;
+                }
+            }
+        };
+        application.set_policy(Some(*policy));
+        Ok(application)
+    }
+}

@@ -1,0 +1,71 @@
+//! Roles of an application that is one of two MainDevices, and what it knows of the other one.
+
+use ringcat_engine::main_device::MainDeviceRole;
+use ringcat_engine::role::{Partner, RoleControl};
+use ringcat_engine::time::Instant;
+
+use super::{ForwardingCounters, Policy};
+use crate::acyclic::AcyclicHalf;
+use crate::application::Application;
+use crate::links::Links;
+use crate::process_data::ProcessData;
+
+/// In a ring of two MainDevices ([`Options::standby`](crate::Options::standby)). Roles change with
+/// [`Application::cycle`], not in a loop of the application's own.
+impl<L: Links, H: AcyclicHalf> Application<L, H> {
+    /// The role, as of the beginning of this cycle.
+    pub fn role(&self) -> MainDeviceRole {
+        self.cyclic.exchange.role()
+    }
+
+    /// The role, and requests for another one, for any thread. `None` if this MainDevice is alone.
+    pub fn role_control(&self) -> Option<RoleControl> {
+        self.cyclic.exchange.role_control()
+    }
+
+    /// The other MainDevice, as this one knows it as ACTIVE.
+    pub fn partner(&self) -> Partner {
+        self.cyclic.exchange.partner()
+    }
+
+    /// When process data of the other MainDevice came last, since this one is INACTIVE.
+    pub fn heard_at(&self) -> Option<Instant> {
+        self.cyclic.of_two.heard_at
+    }
+
+    /// Frames that the cyclic half has forwarded as INACTIVE.
+    pub fn forwarded(&self) -> ForwardingCounters {
+        self.cyclic.of_two.counters()
+    }
+
+    /// Sets what decides about the role from the next cycle on; `None`: the application does, with requests
+    /// ([`Application::role_control`]). To be called before the cycles begin.
+    pub fn set_policy(&mut self, policy: Option<Policy>) {
+        self.cyclic.set_policy(policy, &self.links);
+    }
+}
+
+/// In a ring of two MainDevices ([`Options::standby`](crate::Options::standby)).
+impl ProcessData<'_> {
+    /// The role in this cycle. As INACTIVE outputs are those that the ACTIVE has sent last, and what is written to them
+    /// is not sent.
+    pub fn role(&self) -> MainDeviceRole {
+        self.exchange.role()
+    }
+
+    /// The other MainDevice, as this one knows it as ACTIVE.
+    pub fn partner(&self) -> Partner {
+        self.exchange.partner()
+    }
+
+    /// Process data for the other MainDevice, of as many bytes as
+    /// [`StandbyOptions::sizes`](super::StandbyOptions::sizes) says.
+    pub fn to_partner_mut(&mut self) -> &mut [u8] {
+        self.exchange.to_partner_mut()
+    }
+
+    /// Process data of the other MainDevice, of the last cycle in which all of it has arrived; empty before.
+    pub fn from_partner(&self) -> &[u8] {
+        self.exchange.from_partner()
+    }
+}

@@ -1,0 +1,133 @@
+//! The program of a MainDevice of two: it joins, and takes over by the policy of the library.
+
+use std::ops::Range;
+use std::time::Duration;
+
+use ringcat::simulated::two_hosts::HostLinks;
+use ringcat::standby::{Joining, Next, Policy, StandbyOptions};
+use ringcat::{
+    Application, DomainId, DomainState, Error, Event, MainDevice, MainDeviceRole, Options, ProcessData, Scan, automatic,
+};
+
+use super::board::{Board, Phase};
+use super::programs::{CYCLE, outputs_of};
+
+/// Cycles without the ACTIVE after which the other one takes over.
+pub const TIME_OUT_CYCLES: u32 = 3;
+/// How long it listens before it looks again what follows.
+const SLICE: Duration = Duration::from_millis(1);
+/// How long it listens at its start.
+const LISTEN: Duration = Duration::from_millis(30);
+
+/// Joins, and writes the number of the cycle to all outputs, in either role.
+pub(super) fn member(mut links: HostLinks, board: &Board) {
+    links.switch(true);
+    let failure = exchange(links, board).err();
+    board.note(|seen| {
+        seen.phase = Phase::Ended;
+        seen.failure = failure.map(|error| error.to_string());
+    });
+}
+
+/// What a cycle has shown.
+struct Shown {
+    role: MainDeviceRole,
+    is_complete: bool,
+    is_other_ready: bool,
+    /// Cycles since the outputs were written that the image had.
+    age: Option<u64>,
+}
+
+fn exchange(links: HostLinks, board: &Board) -> Result<(), Error> {
+    let options = Options::default().with_standby(StandbyOptions::default());
+    let policy = Policy::default().with_time_out(TIME_OUT_CYCLES, Duration::ZERO).with_listen(LISTEN);
+    let mut application = join(MainDevice::request(links, &options), &policy, board)?;
+    application.set_policy(Some(policy));
+    let outputs = outputs_of(&application, application.states().len());
+    let mut is_running = application.role() == MainDeviceRole::Inactive;
+    while !board.is_asked_to_stop() {
+        if let Some((request, control)) = board.take_request().zip(application.role_control()) {
+            control.request(request);
+        }
+        let shown = application.cycle(|data| {
+            let phase = match data.role() {
+                MainDeviceRole::Active if is_running => Phase::Active,
+                MainDeviceRole::Active => Phase::Starting,
+                _ => Phase::Inactive,
+            };
+            // Before the frames of this cycle leave.
+            board.note(|seen| seen.begin(phase, data.now()));
+            work(data, &outputs)
+        });
+        is_running |= application.all_settled() && shown.is_complete;
+        note(board, &mut application, &shown);
+    }
+    application.into_links().switch(false);
+    Ok(())
+}
+
+/// As [`MainDevice::join`], and notes when it becomes ACTIVE.
+fn join(main_device: MainDevice<HostLinks>, policy: &Policy, board: &Board) -> Result<Application<HostLinks>, Error> {
+    let mut main_device = main_device;
+    let mut joining = Joining::begin(&main_device, policy);
+    let declare = |scan: &Scan| automatic(&scan.subdevices, CYCLE);
+    loop {
+        main_device.listen(SLICE)?;
+        match joining.next(&main_device) {
+            Next::Follow => return Ok(main_device.follow(declare)?),
+            Next::BecomeActive => {
+                let now = main_device.now();
+                board.note(|seen| seen.begin(Phase::Starting, now));
+                main_device.become_active();
+                return Ok(main_device.bring_up(declare)?);
+            }
+            _ => main_device.attend(SLICE),
+        }
+    }
+}
+
+fn work(data: &mut ProcessData<'_>, outputs: &[Range<usize>]) -> Shown {
+    let number = (data.now().0 / CYCLE.as_nanos() as u64) as u16;
+    let mut age = None;
+    for area in outputs.iter().cloned() {
+        let bytes = data.outputs_mut(DomainId(0), area).expect("they are outputs");
+        if let [low, high, ..] = *bytes
+            && (low, high) != (0, 0)
+        {
+            age = Some(u64::from(number.wrapping_sub(u16::from_le_bytes([low, high]))));
+        }
+        let pattern = number.to_le_bytes().into_iter().cycle();
+        bytes.iter_mut().zip(pattern).for_each(|(byte, value)| *byte = value);
+    }
+    let status = data.status(DomainId(0)).expect("it is declared");
+    Shown {
+        role: data.role(),
+        is_complete: status.state == DomainState::Complete && status.wkc == status.expected,
+        is_other_ready: data.partner().is_ready(),
+        age,
+    }
+}
+
+fn note(board: &Board, application: &mut Application<HostLinks>, shown: &Shown) {
+    let mut events = Vec::new();
+    while let Some(event) = application.pop_event() {
+        if let Event::Standby(event) = event.event {
+            events.push(format!("{event:?}"));
+        }
+    }
+    let is_active = shown.role == MainDeviceRole::Active;
+    board.note(|seen| {
+        let has_process_data = seen.phase == Phase::Active;
+        seen.cycles += u64::from(has_process_data);
+        seen.incomplete += u64::from(has_process_data && !shown.is_complete);
+        seen.is_last_complete = shown.is_complete;
+        seen.ring = application.ring();
+        seen.is_other_ready = is_active && shown.is_other_ready;
+        if !is_active {
+            seen.followed += 1;
+            seen.oldest_followed = seen.oldest_followed.max(shown.age.unwrap_or(0));
+        }
+        seen.forwarded = application.forwarded();
+        seen.events.extend(events);
+    });
+}
