@@ -6,7 +6,8 @@
 //!   [`wires`]: opened anew for each owner; [`opened`]: as long as a process has them; [`opener`]: packet sockets from
 //!   a process of its own;
 //! * [`segment_process`]: a simulated segment in a process of its own;
-//! * [`master`]: a master with the process that drives it; [`driving`]: this daemon while it does;
+//! * [`master`]: a master with its links; [`driver`]: the process that drives it; [`driving`]: this daemon while it
+//!   does;
 //! * [`ethernet`]: network interfaces of EoE, which outlast applications;
 //! * [`owner`]: questions to an application that drives a master; [`tenure`]: its time, and what ends it;
 //!   [`process_state`]: what the kernel tells of its process; [`owner_lock`]: what of it outlives the daemon;
@@ -22,6 +23,7 @@ pub mod check;
 pub mod conf;
 pub mod daemon;
 pub mod device;
+pub mod driver;
 pub mod driving;
 pub mod ethernet;
 pub mod listening;

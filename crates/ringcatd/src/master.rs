@@ -14,6 +14,7 @@ use ringcat_control::message::{Answer, HandedBus, MasterState, Query, ToolAnswer
 use ringcat_control::{Content, Message, Refusal};
 use ringcat_link::TapInterface;
 
+use crate::driver::{CHANGE, Current, Driver};
 use crate::driving::{Driving, Lasting};
 use crate::ethernet::EthernetInterfaces;
 use crate::log::say;
@@ -59,7 +60,7 @@ pub struct Master {
     safe_state: AlState,
     wires: Mutex<Wires>,
     lock: Mutex<Option<OwnerLock>>,
-    driver: Mutex<Driver>,
+    driver: Current,
     /// Network interfaces of EoE; `None`: none is to be made.
     interfaces: Option<Arc<EthernetInterfaces>>,
     /// What is known of the segment while the daemon does not drive it.
@@ -68,19 +69,6 @@ pub struct Master {
     lines: Arc<Mutex<Lines>>,
     /// Level of messages, whatever drives the master.
     debug_level: AtomicU32,
-}
-
-/// What drives a master.
-#[derive(Debug)]
-enum Driver {
-    /// This daemon, with descriptors for the next owner.
-    Daemon(Driving, Arc<Opened>),
-    /// An application, with the descriptors that it has.
-    Owner(Arc<OwnerLink>, Arc<Opened>),
-    /// It passes from one process to another.
-    Changing,
-    /// Nothing, because of this.
-    Fault(String),
 }
 
 /// How the time of an owner has ended.
@@ -140,7 +128,7 @@ impl Master {
             safe_state,
             wires: Mutex::new(wires),
             lock: Mutex::new(lock),
-            driver: Mutex::new(Driver::Changing),
+            driver: Current::default(),
             interfaces: interfaces.map(Arc::new),
             knowledge: Mutex::default(),
             lines: Arc::default(),
@@ -174,7 +162,7 @@ impl Master {
 
     /// Its links, and what drives it.
     pub fn state(&self) -> MasterState {
-        let (owner, fault) = match &*locked(&self.driver) {
+        let (owner, fault) = match &*self.driver.lock() {
             Driver::Owner(owner, _) => (Some(owner.owner().clone()), None),
             Driver::Fault(cause) => (None, Some(cause.clone())),
             Driver::Daemon(..) | Driver::Changing => (None, None),
@@ -200,19 +188,20 @@ impl Master {
 
     fn ask_driver(&self, what: Query, bytes: Vec<u8>) -> Answered {
         let master = self.number;
-        let supervisor = match &*locked(&self.driver) {
-            Driver::Daemon(driving, _) => Ok(driving.supervisor().clone()),
+        let supervisor = match &*self.driver.lock() {
+            Driver::Daemon(driving, opened) => Ok((driving.supervisor().clone(), opened.clone())),
             Driver::Owner(owner, _) => Err(owner.clone()),
             Driver::Changing => return Err(Refusal::Changing { master }),
             Driver::Fault(cause) => return Err(Refusal::Fault { master, cause: cause.clone() }),
         };
-        let supervisor = match supervisor {
-            Ok(supervisor) => supervisor,
+        let (supervisor, opened) = match supervisor {
+            Ok(daemon) => daemon,
             Err(owner) => return owner.ask(what, bytes),
         };
         let answered = serving::answer(&supervisor, what, bytes);
-        // A hand-over in between has ended it.
-        if answered.is_err() && !matches!(&*locked(&self.driver), Driver::Daemon(..)) {
+        // A hand-over in between has ended it, also if the daemon has the master again.
+        let is_same = || matches!(&*self.driver.lock(), Driver::Daemon(_, now) if Arc::ptr_eq(now, &opened));
+        if answered.is_err() && !is_same() {
             return Err(Refusal::Changing { master });
         }
         answered
@@ -224,12 +213,12 @@ impl Master {
     /// # Errors
     /// Why not. The daemon drives the master then, as far as it did before.
     pub fn hand_over(&self, owner: &Arc<OwnerLink>) -> Result<Tenancy<'_>, Refusal> {
-        let (driving, opened) = self.begin_change()?;
+        let (driving, opened) = self.driver.take_from_daemon(self.number, CHANGE)?;
         let tenancy = Tenancy { master: self, opened, is_over: false };
         let bytes = driving.hand_over();
         locked(&self.knowledge).clone_from(&bytes);
         let sent = self.send_bus(owner, &tenancy.opened, bytes);
-        *locked(&self.driver) = Driver::Owner(owner.clone(), tenancy.opened.clone());
+        self.driver.set(Driver::Owner(owner.clone(), tenancy.opened.clone()));
         match sent {
             Ok(()) => Ok(tenancy),
             Err(error) => {
@@ -283,25 +272,6 @@ impl Master {
         opened.switch(usize::from(is_redundant), up)
     }
 
-    /// Takes what the daemon drives out of its hands.
-    fn begin_change(&self) -> Result<(Driving, Arc<Opened>), Refusal> {
-        let master = self.number;
-        let mut driver = locked(&self.driver);
-        match std::mem::replace(&mut *driver, Driver::Changing) {
-            Driver::Daemon(driving, opened) => Ok((driving, opened)),
-            Driver::Changing => Err(Refusal::Changing { master }),
-            Driver::Owner(owner, opened) => {
-                let by = owner.owner().clone();
-                *driver = Driver::Owner(owner, opened);
-                Err(Refusal::Owned { master, by })
-            }
-            Driver::Fault(cause) => {
-                *driver = Driver::Fault(cause.clone());
-                Err(Refusal::Fault { master, cause })
-            }
-        }
-    }
-
     /// Keeps what an owner knows, for the case that it crashes. False if it cannot be read and is not kept.
     pub fn keep(&self, knowledge: Vec<u8>) -> bool {
         let is_usable = Knowledge::from_bytes(&knowledge).is_ok();
@@ -315,7 +285,7 @@ impl Master {
     fn fail(&self, cause: &str) {
         say(format_args!("master {} is not driven: {cause}", self.number));
         let fault = Driver::Fault(cause.to_owned());
-        if let Driver::Owner(owner, _) = std::mem::replace(&mut *locked(&self.driver), fault) {
+        if let Driver::Owner(owner, _) = self.driver.set(fault) {
             owner.end();
             // It may have ended.
             let told = Content::TakenBack { cause: cause.to_owned() };
@@ -325,7 +295,7 @@ impl Master {
 
     /// The time of its owner has ended: the daemon drives the master.
     fn take_back(&self, opened: &Opened, end: End) {
-        if let Driver::Owner(owner, _) = std::mem::replace(&mut *locked(&self.driver), Driver::Changing) {
+        if let Driver::Owner(owner, _) = self.driver.set(Driver::Changing) {
             owner.end();
         }
         let handover = match end {
@@ -355,14 +325,14 @@ impl Master {
     pub fn supervise(&self) {
         self.prepare();
         self.leave_alone();
-        let is_faulty = matches!(&*locked(&self.driver), Driver::Fault(_));
+        let is_faulty = matches!(&*self.driver.lock(), Driver::Fault(_));
         if is_faulty {
             self.drive(Handover::AfterCrash);
         }
         for change in self.opened().map(|opened| opened.follow_interfaces()).unwrap_or_default() {
             say(format_args!("master {}: {change}", self.number));
         }
-        let changes = match &*locked(&self.driver) {
+        let changes = match &*self.driver.lock() {
             Driver::Daemon(driving, _) => driving.changes(),
             _ => Vec::new(),
         };
@@ -374,14 +344,18 @@ impl Master {
     /// An interface that was not named, but chosen, is left alone when the host begins to use it. One that an
     /// application drives stays: a machine may run with it.
     fn leave_alone(&self) {
-        if !matches!(&*locked(&self.driver), Driver::Daemon(..)) {
+        if !matches!(&*self.driver.lock(), Driver::Daemon(..)) {
             return;
         }
-        let Some(cause) = locked(&self.wires).leave_misfit() else { return };
+        let Some(cause) = locked(&self.wires).misfit() else { return };
         let before = {
-            let mut driver = locked(&self.driver);
+            let mut driver = self.driver.lock();
             match &*driver {
-                Driver::Daemon(..) => std::mem::replace(&mut *driver, Driver::Fault(cause.clone())),
+                Driver::Daemon(..) => {
+                    locked(&self.wires).leave();
+                    std::mem::replace(&mut *driver, Driver::Fault(cause.clone()))
+                }
+                // An application has got it meanwhile.
                 Driver::Owner(..) | Driver::Changing | Driver::Fault(_) => return,
             }
         };
@@ -393,7 +367,7 @@ impl Master {
 
     /// The links of the process that drives it; `None` while nothing does.
     fn opened(&self) -> Option<Arc<Opened>> {
-        match &*locked(&self.driver) {
+        match &*self.driver.lock() {
             Driver::Daemon(_, opened) | Driver::Owner(_, opened) => Some(opened.clone()),
             Driver::Changing | Driver::Fault(_) => None,
         }
@@ -404,13 +378,13 @@ impl Master {
         let driver = match self.try_to_drive(handover) {
             Ok((driving, opened)) => Driver::Daemon(driving, opened),
             Err(cause) => {
-                if !matches!(&*locked(&self.driver), Driver::Fault(before) if *before == cause) {
+                if !matches!(&*self.driver.lock(), Driver::Fault(before) if *before == cause) {
                     say(format_args!("master {} is not driven: {cause}", self.number));
                 }
                 Driver::Fault(cause)
             }
         };
-        *locked(&self.driver) = driver;
+        self.driver.set(driver);
     }
 
     fn try_to_drive(&self, handover: Handover) -> Result<(Driving, Arc<Opened>), String> {
@@ -430,7 +404,7 @@ impl Master {
 
     /// Brings all SubDevices to the safe state, if the daemon drives the master.
     fn lead_to_safe_state(&self) {
-        if let Driver::Daemon(driving, _) = &*locked(&self.driver) {
+        if let Driver::Daemon(driving, _) = &*self.driver.lock() {
             driving.lead_to(self.safe_state, self.number);
         }
     }

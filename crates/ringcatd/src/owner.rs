@@ -5,12 +5,14 @@
 
 use std::collections::BTreeMap;
 use std::io;
+use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::net::UnixStream;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use ringcat_control::message::{Answer, Content, Message, Numbered, Owner, Query};
 use ringcat_control::{Connection, Refusal, Right};
+use ringcat_link::process::wait_readable;
 
 /// An owner takes a question within this time.
 pub const SILENCE: Duration = Duration::from_secs(1);
@@ -32,6 +34,8 @@ pub struct OwnerLink {
     /// It moves frames of EoE.
     moves_ethernet: bool,
     connection: Arc<Connection>,
+    /// Readable when its process has ended; of a process in another name space there is none.
+    end: Option<OwnedFd>,
     questions: Mutex<Questions>,
     changed: Condvar,
 }
@@ -64,7 +68,17 @@ impl OwnerLink {
     /// The process at the other end of this connection.
     pub fn new(master: u32, owner: Owner, moves_ethernet: bool, connection: Arc<Connection>) -> OwnerLink {
         let (questions, changed) = (Mutex::default(), Condvar::new());
-        OwnerLink { master, owner, moves_ethernet, connection, questions, changed }
+        OwnerLink { master, owner, moves_ethernet, connection, end: None, questions, changed }
+    }
+
+    /// With the descriptor that shows the end of its process.
+    pub fn with_end(self, end: Option<OwnedFd>) -> OwnerLink {
+        OwnerLink { end, ..self }
+    }
+
+    /// Its process has ended, as far as that can be seen.
+    pub fn has_ended(&self) -> bool {
+        self.end.as_ref().is_some_and(|end| wait_readable(&[end.as_fd()], Duration::ZERO) == 1)
     }
 
     /// Whether it moves frames between network interfaces of EoE and mailboxes.
@@ -210,6 +224,12 @@ pub fn for_tests() -> io::Result<(OwnerLink, Connection)> {
     let (near, far) = UnixStream::pair()?;
     let owner = Owner { pid: 42, program: "test".to_owned() };
     Ok((OwnerLink::new(0, owner, false, Arc::new(Connection::new(near)?)), Connection::new(far)?))
+}
+
+/// The same of a process whose end this descriptor shows.
+#[cfg(test)]
+pub fn for_tests_of(end: OwnedFd) -> io::Result<(OwnerLink, Connection)> {
+    for_tests().map(|(owner, far)| (owner.with_end(Some(end)), far))
 }
 
 #[cfg(test)]

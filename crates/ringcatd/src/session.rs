@@ -100,7 +100,7 @@ fn converse(connection: &Arc<Connection>, process: ClientProcess, masters: &Mast
             Content::Take { master, ethernet } => {
                 let owner = Owner { pid: peer.pid, program };
                 let signs = Signs::new(peer.pid, end)?;
-                let owner = OwnerLink::new(master, owner, ethernet, connection.clone());
+                let owner = OwnerLink::new(master, owner, ethernet, connection.clone()).with_end(signs.end());
                 return own(masters, masters.find(master)?, owner, signs);
             }
             _ => return Err(expected("a question, or a request for a master")),

@@ -49,6 +49,11 @@ impl Signs {
         Ok(Signs { end, file })
     }
 
+    /// A duplicate of the descriptor that shows the end of the process; `None` without one.
+    pub fn end(&self) -> Option<OwnedFd> {
+        self.end.as_ref().and_then(|end| end.try_clone().ok())
+    }
+
     /// How the time of an owner has ended whose connection has.
     fn of_connection(&mut self) -> End {
         let end = self.end.as_ref().map(|end| wait_readable(&[end.as_fd()], EXIT));

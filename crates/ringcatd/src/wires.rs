@@ -92,13 +92,17 @@ impl Wires {
         }
     }
 
-    /// Whether the interface that was chosen is to be left alone from now on, and why: it is gone, or the host uses it.
-    /// The next open chooses again.
-    pub fn leave_misfit(&mut self) -> Option<String> {
+    /// Why the interface that was chosen is to be left alone from now on, if it is: it is gone, or the host uses it.
+    pub fn misfit(&self) -> Option<String> {
         let Wires::Interfaces(Interfaces { chosen, .. }) = self else { return None };
-        let cause = misfit((*chosen)?)?;
-        *chosen = None;
-        Some(cause)
+        misfit((*chosen)?)
+    }
+
+    /// Leaves the interface that was chosen. The next open chooses again.
+    pub fn leave(&mut self) {
+        if let Wires::Interfaces(Interfaces { chosen, .. }) = self {
+            *chosen = None;
+        }
     }
 
     /// The links to a segment that another thread or process simulates, which it has said.
@@ -208,5 +212,26 @@ impl Drop for Wires {
             // It may live on for an application; if it has ended no zombie is left.
             let _ = child.try_wait();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An application may get the interface between the look and the decision: it stays chosen then.
+    // covers: daemon
+    #[test]
+    fn an_interface_stays_chosen_until_it_is_left_whatever_hinders_it() {
+        let source = Source::Interfaces(Device::First, None);
+        let mut wires = Wires::of(&source, &[], &Arc::new(Opener::Here)).expect("it has a name");
+        assert_eq!(wires.misfit(), None, "none is chosen");
+        let Wires::Interfaces(interfaces) = &mut wires else { panic!("it has interfaces") };
+        interfaces.chosen = Some([2, 0, 0, 0, 0, 0x99]);
+        for _ in 0..2 {
+            assert_eq!(wires.misfit().as_deref(), Some("interface 02:00:00:00:00:99 was removed"));
+        }
+        wires.leave();
+        assert_eq!(wires.misfit(), None);
     }
 }

@@ -1,6 +1,6 @@
 /*
- * Requests a master and forks. The parent waits for a signal; the child outlives it with all descriptors, releases the
- * handle that it has inherited, and ends.
+ * Requests a master and forks. The parent waits for a signal; the child outlives it with all descriptors until its
+ * input ends, releases the handle that it has inherited, and ends.
  */
 #include <stdio.h>
 #include <unistd.h>
@@ -18,7 +18,8 @@ int main(void)
         return 1;
     }
     if (child == 0) {
-        sleep(3);
+        while (getchar() != EOF)
+            ;
         ecrt_release_master(master);
         printf("child released\n");
         fflush(stdout);

@@ -135,7 +135,7 @@ int main(void)
     for (i = 0; i < 500; i++)
         CHECK(cycle() == 0);
     CHECK(allocations == 0);
-    for (i = 0; i < 500 && !is_complete(); i++)
+    for (i = 0; i < 10000 && !is_complete(); i++)
         cycle();
     CHECK(is_complete());
 
@@ -147,7 +147,7 @@ int main(void)
     CHECK(wrong == 0);
     for (i = 0; i < 100; i++)
         CHECK(cycle() == 0);
-    for (i = 0; i < 500 && !is_complete(); i++)
+    for (i = 0; i < 10000 && !is_complete(); i++)
         cycle();
     CHECK(is_complete());
     printf("refused %lu calls\n", refused);

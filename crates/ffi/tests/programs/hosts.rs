@@ -7,7 +7,7 @@ use std::process::Command;
 use ringcatd::rights::Rights;
 
 use crate::daemon::Bench;
-use crate::library::{here, installed, on_segment, outputs, program};
+use crate::library::{copy_program, here, installed, on_segment, outputs, program};
 
 fn ends_well(mode: &[&str]) {
     let Some(hosts) = program(&here().join("tests/c/hosts.c"), &[]) else { return };
@@ -89,7 +89,7 @@ fn the_library_is_opened_and_closed_a_hundred_times_in_one_process() {
 fn a_set_uid_program_ignores_the_variables_of_its_user() {
     let Some(hosts) = program(&here().join("tests/c/hosts.c"), &[]) else { return };
     let place = std::env::temp_dir().join(format!("ringcat-set-uid-{}", std::process::id()));
-    std::fs::copy(&hosts, &place).expect("a copy");
+    assert!(copy_program(&hosts, &place));
     std::fs::set_permissions(&place, PermissionsExt::from_mode(0o4755)).expect("permissions");
     let library = std::fs::canonicalize(installed().expect("it was compiled").join("lib/libethercat.so.1"));
     let segment = here().join("tests/c/services.toml");

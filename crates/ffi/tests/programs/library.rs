@@ -1,9 +1,15 @@
 //! The library as the tests link it, and programs that run with it.
 
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitStatus, Output};
+use std::process::{Command, ExitStatus, Output, Stdio};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::mpsc::channel;
+use std::time::{Duration, Instant};
+
+/// A program says what a test waits for within this time, also on a busy machine.
+const LONG: Duration = Duration::from_secs(60);
 
 /// The directory of this crate.
 pub fn here() -> &'static Path {
@@ -106,4 +112,41 @@ pub fn outputs(program: &Path, segment: &Path, arguments: &[&str]) -> (String, S
     command.arg("120").arg(program).args(arguments).env("RINGCAT_SIM", segment);
     let Output { status, stdout, stderr } = command.output().expect("the program runs");
     (String::from_utf8_lossy(&stdout).into_owned(), String::from_utf8_lossy(&stderr).into_owned(), status)
+}
+
+/// Runs a program until it has said these lines, and interrupts it as Ctrl-C does; what it has said, what it has
+/// reported if that is piped, and how it ends. How many cycles it needs depends on what else runs on this machine.
+pub fn interrupted_after(command: &mut Command, wanted: &[&str]) -> (String, String, ExitStatus) {
+    let mut child = command.stdout(Stdio::piped()).spawn().expect("it runs");
+    let (stdout, stderr) = (child.stdout.take().expect("it is piped"), child.stderr.take());
+    let reported = std::thread::spawn(move || {
+        let mut bytes = Vec::new();
+        stderr.into_iter().for_each(|mut stderr| drop(stderr.read_to_end(&mut bytes)));
+        String::from_utf8_lossy(&bytes).into_owned()
+    });
+    let (sender, lines) = channel();
+    // The test may have given up.
+    std::thread::spawn(move || {
+        BufReader::new(stdout).lines().map_while(Result::ok).try_for_each(|line| sender.send(line)).ok()
+    });
+    let (begin, mut said): (_, Vec<String>) = (Instant::now(), Vec::new());
+    while !wanted.iter().all(|wanted| said.iter().any(|line| line == wanted)) {
+        let Ok(line) = lines.recv_timeout(LONG.saturating_sub(begin.elapsed())) else {
+            let _ = child.kill();
+            panic!("{said:#?} instead of {wanted:?}: {:?}\n{}", child.wait(), reported.join().unwrap_or_default());
+        };
+        said.push(line);
+    }
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(sent.is_ok_and(|status| status.success()));
+    let status = child.wait().expect("it ends");
+    // Until the end of its output.
+    said.extend(lines);
+    (said.join("\n"), reported.join().expect("no panic"), status)
+}
+
+/// Copies a program. By another process: a descriptor of this one that is open for writing may be in a child that
+/// another test starts, and a program that is open for writing cannot be started.
+pub fn copy_program(from: &Path, to: &Path) -> bool {
+    Command::new("cp").arg("--").arg(from).arg(to).status().is_ok_and(|status| status.success())
 }

@@ -8,10 +8,10 @@ use std::io::{BufRead, BufReader};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::mpsc::channel;
+use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-use crate::library::{installed, root};
+use crate::library::{copy_program, installed, root};
 
 /// A user without a right.
 const USER: &str = "65534";
@@ -28,7 +28,9 @@ fn commands() -> String {
 
 fn script(path: &Path, text: &str) {
     fs::create_dir_all(path.parent().expect("a directory")).expect("it can be made");
-    fs::write(path, format!("#!/bin/sh\n{text}\n")).expect("it can be written");
+    let written = path.with_extension("text");
+    fs::write(&written, format!("#!/bin/sh\n{text}\n")).expect("it can be written");
+    assert!(copy_program(&written, path));
     fs::set_permissions(path, fs::Permissions::from_mode(0o755)).expect("it is ours");
 }
 
@@ -39,7 +41,7 @@ fn place(prefix: &Path) -> Option<PathBuf> {
     let built = own.ancestors().nth(2).expect("a directory of programs");
     fs::create_dir_all(place.join("target/release")).expect("it can be made");
     for name in ["ringcatd", "ringcat"] {
-        if fs::copy(built.join(name), place.join("target/release").join(name)).is_err() {
+        if !copy_program(&built.join(name), &place.join("target/release").join(name)) {
             println!("skipped: {name} is not built (cargo test --workspace builds it)");
             fs::remove_dir_all(&place).expect("it is there");
             return None;
@@ -47,7 +49,9 @@ fn place(prefix: &Path) -> Option<PathBuf> {
     }
     script(&place.join("bin/cargo"), "exit 0");
     let (lib, include) = (prefix.join("lib"), prefix.join("include"));
-    let install = format!("mkdir -p \"$2\" && cp -r {} {} \"$2\"", lib.display(), include.display());
+    // The real one compiles for a while: the daemon of the line before listens by then. This one waits for it.
+    let listens = "i=0; until test -S /tmp/ringcat-$(id -u)/control || test $i = 600; do sleep 0.1; i=$((i+1)); done";
+    let install = format!("mkdir -p \"$2\" && cp -r {} {} \"$2\"\n{listens}", lib.display(), include.display());
     script(&place.join("crates/ffi/install"), &install);
     let examples = place.join("examples/c");
     fs::create_dir_all(&examples).expect("it can be made");
@@ -104,6 +108,8 @@ fn the_commands_of_the_readme_work_without_a_right_as_they_are_typed() {
             }
         });
     }
+    // The readers alone have it: the lines end with the programs.
+    drop(lines);
     let mut all = Vec::new();
     let (daemon, first) = (place.join("target/release/ringcatd"), place.join("examples/c/first_application"));
     while all.last().is_none_or(|line| line != "AnaIn: operational.") {
@@ -117,7 +123,17 @@ fn the_commands_of_the_readme_work_without_a_right_as_they_are_typed() {
     assert_eq!(end(&first, "-INT"), 1);
     let status = shell.wait().expect("it ends");
     assert!(end(&daemon, "-TERM") >= 1, "it goes on");
-    all.extend(said.try_iter());
+    // The daemon has the streams, too: they end with it.
+    let is_over = loop {
+        match said.recv_timeout(LONG) {
+            Ok(line) => all.push(line),
+            Err(error) => break error == RecvTimeoutError::Disconnected,
+        }
+    };
+    if !is_over {
+        end(&daemon, "-KILL");
+    }
+    assert!(is_over, "the daemon does not end: {all:#?}");
     assert!(status.success(), "{status}\n{all:#?}");
     // What `ringcat run` says at its end: on a busy machine frames may have come late.
     let result = all.iter().find(|line| line.starts_with("result: ")).expect("ringcat run has ended");

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -105,11 +106,16 @@ impl Bench {
         let (daemon, looks, segment) = (Some(daemon), Some(looks), Some(segment));
         let bench = Bench { socket, daemon, looks, segment, directory, _turn: turn };
         bench.wait_until("all in PREOP", |bench| bench.are_in(AlState::PreOp));
-        bench.wait_until("scanned", |bench| {
+        bench.wait_until_scanned(count);
+        bench
+    }
+
+    /// Waits until the daemon has the bus and knows so many SubDevices.
+    pub fn wait_until_scanned(&self, count: usize) {
+        self.wait_until("scanned", |bench| {
             let Answer::State(state) = ask(&mut bench.client(), Query::State) else { return false };
             state.activity == Activity::Scanned && state.subdevices.len() == count
         });
-        bench
     }
 
     /// Looks into the segment.
@@ -180,7 +186,15 @@ impl Drop for Bench {
     }
 }
 
-/// An answer that is not data.
+/// An answer that is not data. SubDevices may be in PREOP before the daemon answers for the master, after the end of an
+/// application.
 pub fn ask(client: &mut Client, ask: Query) -> Answer {
-    client.ask(0, ask, Vec::new()).expect("it is answered").0
+    client.ask_patiently(0, &ask, &[]).expect("it is answered").0
+}
+
+/// Copies a program. By another process: a descriptor of this one that is open for writing may be in a child that
+/// another test starts, and a program that is open for writing cannot be started.
+pub fn copy_program(from: impl AsRef<Path>, to: &Path) {
+    let copied = Command::new("cp").arg("--").arg(from.as_ref()).arg(to).status();
+    assert!(copied.is_ok_and(|status| status.success()), "{}", to.display());
 }

@@ -8,7 +8,7 @@ use ringcat::daemon::{Answer, Client, ClientError, Query, Right};
 use ringcat::{Activity, AlState};
 use ringcat_control::Refusal;
 
-use crate::bench::{Bench, ask, check_bar};
+use crate::bench::{Bench, ask, check_bar, copy_program};
 use crate::owner_process::{OwnerProcess, Work};
 
 /// Position of a drive, with a mailbox.
@@ -40,7 +40,7 @@ fn questions_have_the_same_answers_whichever_process_drives_the_bus() {
     let mut client = bench.client();
     assert_eq!(client.right(), Right::Change);
     let idle = read_all(&mut client, 2);
-    let owner = OwnerProcess::start(&bench.socket, Work::Cycle);
+    let owner = OwnerProcess::start(&bench.socket, Work::Patient);
     let active = read_all(&mut client, 8);
     assert_eq!((&idle[0], &idle[2]), (&active[0], &active[2]));
     let Answer::Masters(masters) = ask(&mut client, Query::Masters) else { panic!("they are masters") };
@@ -48,6 +48,7 @@ fn questions_have_the_same_answers_whichever_process_drives_the_bus() {
     assert_eq!((by.pid, by.program.as_str()), (owner.child.id(), "application"));
     owner.end();
     bench.wait_until("all in PREOP", |bench| bench.are_in(AlState::PreOp));
+    bench.wait_until_scanned(4);
     assert_eq!(read_all(&mut client, 2), idle);
 }
 
@@ -104,7 +105,7 @@ const RATE: u64 = 100;
 #[test]
 fn fifty_clients_at_100_hz_are_answered_beside_an_application_in_op() {
     let bench = Bench::start(4);
-    let mut owner = OwnerProcess::start(&bench.socket, Work::Cycle);
+    let mut owner = OwnerProcess::start(&bench.socket, Work::Patient);
     let begin = Instant::now();
     let ask_often = |number: u64| {
         let mut client = Client::connect(&bench.socket, "often").expect("there is room");
@@ -165,7 +166,7 @@ fn another_user_may_read_and_changes_nothing() {
     }
     let bench = Bench::start(4);
     let copy = bench.socket.with_file_name("test");
-    std::fs::copy(std::env::current_exe().expect("it is known"), &copy).expect("it can be read");
+    copy_program(std::env::current_exe().expect("it is known"), &copy);
     let mut reader = Command::new(&copy);
     reader.args(["--exact", "clients::another_user_may_read_and_changes_nothing", "--nocapture"]);
     let reader = reader.env(SOCKET, &bench.socket).current_dir("/").uid(65_534).gid(65_534).output();

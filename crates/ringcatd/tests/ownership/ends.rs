@@ -117,7 +117,7 @@ fn an_application_that_ends_without_a_release_leaves_the_bus_to_the_daemon() {
     let bench = Bench::start(4);
     let mut client = bench.client();
     for signal in ["-TERM", "-ABRT", "-SYS"] {
-        let owner = OwnerProcess::start(&bench.socket, Work::Cycle);
+        let owner = OwnerProcess::start(&bench.socket, Work::Patient);
         assert!(bench.are_in(AlState::Op));
         let at = now_ns();
         owner.signal(signal);
@@ -155,18 +155,36 @@ fn a_core_dump_does_not_delay_the_daemon() {
     check_bar("with a core", times[2], FIRST_FRAME[1]);
 }
 
+/// An application may be stopped for so long.
+const SHORT_LIMIT: Duration = Duration::from_millis(100);
+
+/// An application that was stopped for less than the limit has its bus. On a busy machine the stop may last longer:
+/// then it is tried with another application.
+fn stopped_for_a_moment(bench: &Bench) -> OwnerProcess {
+    let begin = Instant::now();
+    loop {
+        let owner = OwnerProcess::start(&bench.socket, Work::Cycle);
+        let connected = bench.inside(|segment| segment.connected_ns());
+        let stop = Instant::now();
+        owner.signal("-STOP");
+        std::thread::sleep(Duration::from_millis(20));
+        owner.signal("-CONT");
+        let stopped_for = stop.elapsed();
+        std::thread::sleep(2 * SHORT_LIMIT);
+        if stopped_for < SHORT_LIMIT {
+            assert_eq!(bench.inside(|segment| segment.connected_ns()), connected, "a stop of {stopped_for:?} is none");
+            return owner;
+        }
+        assert!(begin.elapsed() < LONG, "no stop was short: {stopped_for:?}");
+    }
+}
+
 // covers: daemon
 #[test]
 fn a_stopped_application_loses_the_bus_after_the_limit_and_sends_nothing_later() {
-    let bench = Bench::with_limit(4, Duration::from_millis(100));
-    let owner = OwnerProcess::start(&bench.socket, Work::Cycle);
-    owner.signal("-STOP");
-    std::thread::sleep(Duration::from_millis(20));
-    owner.signal("-CONT");
-    std::thread::sleep(Duration::from_millis(200));
-    let connected = bench.inside(|segment| segment.connected_ns());
+    let bench = Bench::with_limit(4, SHORT_LIMIT);
+    let owner = stopped_for_a_moment(&bench);
     let at = now_ns();
-    assert!(connected < at, "a short stop is none");
     owner.signal("-STOP");
     let first = wait_for_first_frame(&bench, at);
     assert!(first >= Duration::from_millis(80), "{first:?}");
@@ -190,7 +208,7 @@ fn subdevices_are_in_the_safe_state_of_their_master_after_any_end() {
         let bench = Bench::with(4, ringcatd::daemon::STOP_LIMIT, state);
         assert!(bench.are_in(AlState::PreOp), "before there was an application");
         for is_killed in [true, false] {
-            let mut owner = OwnerProcess::start(&bench.socket, Work::Cycle);
+            let mut owner = OwnerProcess::start(&bench.socket, Work::Patient);
             assert!(bench.are_in(AlState::Op));
             if is_killed {
                 owner.child.kill().expect("it runs");
@@ -205,23 +223,15 @@ fn subdevices_are_in_the_safe_state_of_their_master_after_any_end() {
     }
 }
 
-/// The next one comes while the daemon brings all SubDevices to PREOP.
+/// The next one comes before the daemon has seen the end, or while it brings all SubDevices to PREOP.
 // covers: daemon
 #[test]
 fn an_application_that_is_killed_and_started_again_at_once_reaches_op() {
     let bench = Bench::start(4);
     for _ in 0..25 {
+        // It fails if the master is refused.
         let mut owner = OwnerProcess::start(&bench.socket, Work::Cycle);
         owner.child.kill().expect("it runs");
         owner.child.wait().expect("it has ended");
-        let begin = Instant::now();
-        while begin.elapsed() < Duration::from_secs(2)
-            && !matches!(
-                crate::bench::ask(&mut bench.client(), Query::Masters),
-                Answer::Masters(masters) if masters[0].owner.is_none()
-            )
-        {
-            std::thread::yield_now();
-        }
     }
 }

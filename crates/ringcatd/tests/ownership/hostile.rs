@@ -11,7 +11,7 @@ use ringcat_control::{Connection, Content, Limits, Message, Numbered, Refusal};
 use ringcat_link::descriptors;
 use ringcatd::listening::MOST_CLIENTS;
 
-use crate::bench::{Bench, ask, check_bar};
+use crate::bench::{Bench, LONG, ask, check_bar};
 use crate::owner_process::{OwnerProcess, Work};
 
 /// A question is answered within this time, whatever other clients do.
@@ -53,13 +53,13 @@ fn attacks() -> Vec<Vec<u8>> {
 #[test]
 fn any_bytes_cost_a_client_its_connection_and_nothing_else() {
     let bench = Bench::start(3);
-    let owner = OwnerProcess::start(&bench.socket, Work::Cycle);
+    let owner = OwnerProcess::start(&bench.socket, Work::Patient);
     for attack in attacks() {
         let mut client = UnixStream::connect(&bench.socket).expect("the daemon listens");
         // The daemon may close the connection before all is written.
         let _ = client.write_all(&attack);
         let _ = client.shutdown(std::net::Shutdown::Write);
-        client.set_read_timeout(Some(Duration::from_secs(10))).expect("a socket");
+        client.set_read_timeout(Some(LONG)).expect("a socket");
         let mut said = Vec::new();
         // A connection that is reset has nothing more to say.
         let _ = client.read_to_end(&mut said);
@@ -90,7 +90,7 @@ fn clients_that_neither_speak_nor_read_keep_only_their_own_places() {
         silent.push(Connection::new(UnixStream::connect(&bench.socket).expect("it listens")).expect("a socket"));
     }
     let last = silent.last().expect("there are some");
-    let message = last.receive(Limits::OWNER, Some(Duration::from_secs(5))).expect("the daemon says why");
+    let message = last.receive(Limits::OWNER, Some(LONG)).expect("the daemon says why");
     assert_eq!(message, Message::from(Content::Refused(Refusal::TooManyClients { limit: MOST_CLIENTS })));
     drop(silent);
     bench.wait_until("places are free", |bench| ringcat::daemon::Client::connect(&bench.socket, "next").is_ok());
@@ -112,6 +112,6 @@ fn descriptors_of_a_client_are_closed() {
     is_answered(&bench);
     drop(far);
     // The end is seen only when no duplicate is left in this process, in which the daemon is, too.
-    near.set_read_timeout(Some(Duration::from_secs(5))).expect("a socket");
+    near.set_read_timeout(Some(LONG)).expect("a socket");
     assert_eq!((&near).read(&mut [0]).expect("the end"), 0, "{} descriptors", open());
 }

@@ -61,15 +61,23 @@ fn is_step(line: &str) -> bool {
     text.is_some_and(|text| !is_frame(line) && !USUAL.iter().any(|usual| text.starts_with(usual)))
 }
 
-/// Lines of a SubDevice that goes to INIT and back, when the last messages before it have come.
-fn of_a_change(running: &Running) -> Vec<String> {
-    std::thread::sleep(Duration::from_millis(300));
-    let before = running.lines().len();
+/// Leads a SubDevice to INIT and back. Where the lines end that have come by then, of those from there on.
+fn change(running: &Running, from: usize) -> usize {
+    let mut at = from;
     for (state, expected) in [(1, "EtherCAT: Slave states: INIT, PREOP."), (2, "EtherCAT: Slave states: PREOP.")] {
         running.client().ask(0, Query::RequestState { position: 0, state }, Vec::new()).expect("it reaches it");
-        running.wait_for_lines(|lines| has(&lines[before..], expected));
+        running.wait_for_lines(|lines| has(&lines[at..], expected));
+        at += 1 + running.lines()[at..].iter().position(|line| line == expected).expect("it has come");
     }
-    running.lines()[before..].to_vec()
+    at
+}
+
+/// Lines of a SubDevice that goes to INIT and back. Lines come in their order: behind those of one change there is
+/// nothing from before it.
+fn of_a_change(running: &Running) -> Vec<String> {
+    let before = change(running, running.lines().len());
+    let end = change(running, before);
+    running.lines()[before..end].to_vec()
 }
 
 // covers: daemon

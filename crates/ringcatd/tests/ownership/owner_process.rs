@@ -3,10 +3,12 @@
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ringcat::daemon::OwnedBus;
 use ringcat::{Declaration, Options, Output, Services, SubDeviceConfig};
+
+use crate::bench::LONG;
 
 /// Socket of the daemon, for the process that is an application.
 const SOCKET: &str = "RINGCAT_TEST_OWNER";
@@ -15,6 +17,9 @@ const WORK: &str = "RINGCAT_TEST_WORK";
 
 /// Bytes of memory that an application has in use.
 const MEMORY: usize = 64 << 20;
+
+/// Units of 100 us that watchdogs wait with [`Work::Patient`].
+const PATIENCE: u16 = u16::MAX;
 
 /// What an application does with its bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,6 +30,8 @@ pub enum Work {
     Cycle,
     /// The same where the first one has no watchdog of process data.
     Unwatched,
+    /// The same where watchdogs wait longer than a busy machine delays a cycle: all stay in OP.
+    Patient,
     /// As [`Work::Cycle`], and ends by `exit` without a release.
     Exit,
 }
@@ -32,7 +39,7 @@ pub enum Work {
 impl Work {
     fn of_environment() -> Work {
         let name = std::env::var(WORK).expect("it is set with the socket");
-        let all = [Work::Hold, Work::Cycle, Work::Unwatched, Work::Exit];
+        let all = [Work::Hold, Work::Cycle, Work::Unwatched, Work::Patient, Work::Exit];
         all.into_iter().find(|work| format!("{work:?}") == name).expect("it is one of them")
     }
 }
@@ -92,10 +99,27 @@ impl OwnerProcess {
         }
     }
 
-    /// Sends a signal.
+    /// Sends a signal. A process that is to stop has stopped when this returns.
     pub fn signal(&self, name: &str) {
         let sent = Command::new("kill").args([name, &self.child.id().to_string()]).status();
         assert!(sent.is_ok_and(|status| status.success()));
+        if name == "-STOP" {
+            let begin = Instant::now();
+            while self.is_any_thread_running() {
+                assert!(begin.elapsed() < LONG, "it does not stop");
+                std::thread::sleep(Duration::from_micros(200));
+            }
+        }
+    }
+
+    /// Whether one of its threads has not stopped.
+    fn is_any_thread_running(&self) -> bool {
+        let tasks = std::fs::read_dir(format!("/proc/{}/task", self.child.id())).expect("it is a child").flatten();
+        tasks.into_iter().any(|task| {
+            let state = std::fs::read_to_string(task.path().join("stat")).unwrap_or_default();
+            // Behind the name of the program, which is in brackets.
+            state.rsplit_once(") ").is_some_and(|(_, rest)| !rest.starts_with('T'))
+        })
     }
 
     /// Tells it to end in order.
@@ -138,7 +162,7 @@ fn an_application_drives_the_bus_until_its_input_ends() {
         return;
     }
     let bench = crate::bench::Bench::start(4);
-    let owner = OwnerProcess::start(&bench.socket, Work::Cycle);
+    let owner = OwnerProcess::start(&bench.socket, Work::Patient);
     assert!(bench.are_in(ringcat::AlState::Op), "{:?}", bench.states());
     assert_eq!(owner.end(), "ended: Ok(()), Held");
     bench.wait_until("all in PREOP", |bench| bench.are_in(ringcat::AlState::PreOp));
@@ -172,7 +196,7 @@ fn run(socket: &Path, work: Work) {
                 std::thread::sleep(Duration::from_millis(5));
             }
         }
-        Work::Cycle | Work::Unwatched | Work::Exit => cycle(&mut bus, work, &ended),
+        Work::Cycle | Work::Unwatched | Work::Patient | Work::Exit => cycle(&mut bus, work, &ended),
     }
     drop(memory);
     let had = bus.ownership().now();
@@ -189,6 +213,7 @@ fn cycle(bus: &mut OwnedBus, work: Work, ended: &std::sync::mpsc::Receiver<()>) 
     let mut declaration = Declaration::new(Duration::from_millis(1));
     let declared = found.iter().enumerate().map(|(at, info)| match SubDeviceConfig::from_info(info) {
         config if work == Work::Unwatched && at == 0 => config.watchdog(None, Some(0)),
+        config if work == Work::Patient => config.watchdog(None, Some(PATIENCE)),
         config => config,
     });
     let subdevices: Vec<_> = declared.map(|config| declaration.add(config)).collect();

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use ringcat::daemon::{Answer, Client, ClientError, Query, Refusal};
 use ringcat_control::message::Snapshot;
 
-use crate::bench::{LONG, directory, ring, turn};
+use crate::bench::{LONG, copy_program, directory, ring, turn};
 
 pub const PROGRAM: &str = env!("CARGO_BIN_EXE_ringcatd");
 /// A user without a right.
@@ -154,7 +154,7 @@ fn command(directory: &Path, arguments: &[OsString], start: &Start) -> Command {
     let mut command = Command::new(PROGRAM);
     if let Some(user) = start.user {
         let copy = directory.join("ringcatd");
-        std::fs::copy(PROGRAM, &copy).expect("it can be read");
+        copy_program(PROGRAM, &copy);
         std::fs::set_permissions(directory, std::fs::Permissions::from_mode(0o777)).expect("it is there");
         command = Command::new(copy);
         command.uid(user).gid(user).current_dir("/");

@@ -129,7 +129,8 @@ fn the_service_manager_is_told_ready_state_life_and_end() {
     // The first state after it: master 0 is scanned, and what master 1 waits for was said.
     let ready = manager.seen.iter().position(|line| line == "READY=1").expect("it was seen");
     assert!(status(&manager.seen[ready + 1]), "{:?}", manager.seen);
-    assert!(running.lines().iter().any(|line| line.contains("master 1 is not driven: ")), "{:?}", running.lines());
+    // Written by a thread of its own.
+    running.wait_for_lines(|lines| lines.iter().any(|line| line.contains("master 1 is not driven: ")));
     let mut client = running.client();
     wait_for(&mut client, 0, 3);
     let before = manager.seen.len();

@@ -9,7 +9,7 @@ use ringcat_control::Refusal;
 use ringcat_link::process::effective_user;
 use ringcatd::rights::Rights;
 
-use crate::bench::{Bench, ask};
+use crate::bench::{Bench, ask, copy_program};
 
 /// Socket for the process of another user.
 const SOCKET: &str = "RINGCAT_TEST_USER";
@@ -44,7 +44,7 @@ fn tried(socket: &Path) -> &'static str {
 fn tries(bench: &Bench, user: u32, group: u32) -> String {
     let copy = bench.socket.with_file_name("test");
     if !copy.exists() {
-        std::fs::copy(std::env::current_exe().expect("it is known"), &copy).expect("it can be read");
+        copy_program(std::env::current_exe().expect("it is known"), &copy);
     }
     let mut command = Command::new(&copy);
     command.args(["--exact", TEST, "--nocapture"]).env(SOCKET, &bench.socket).current_dir("/");

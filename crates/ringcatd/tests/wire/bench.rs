@@ -2,10 +2,11 @@
 
 use std::fs;
 use std::io::{BufRead, BufReader};
+use std::ops::{Deref, DerefMut};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixDatagram;
-use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -30,12 +31,39 @@ const COUNT: usize = 3;
 /// One bench at a time: the tests measure times.
 static TURN: Mutex<()> = Mutex::new(());
 
+/// An application. It is killed at the latest when this is dropped, also where a test fails while it is stopped.
+pub struct Application(Child);
+
+impl Deref for Application {
+    type Target = Child;
+
+    fn deref(&self) -> &Child {
+        &self.0
+    }
+}
+
+impl DerefMut for Application {
+    fn deref_mut(&mut self) -> &mut Child {
+        &mut self.0
+    }
+}
+
+impl Drop for Application {
+    fn drop(&mut self) {
+        // It may have ended.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
 /// Namespaces and processes of a test.
 pub struct Bench {
     pub near: String,
     pub far: String,
     pub place: PathBuf,
     processes: Vec<Child>,
+    /// Processes of this test program end with their inputs, however it ends.
+    inputs: Vec<ChildStdin>,
     lines: Arc<Mutex<Vec<String>>>,
     _turn: MutexGuard<'static, ()>,
 }
@@ -43,6 +71,13 @@ pub struct Bench {
 pub fn ip(arguments: &str) {
     let done = Command::new("ip").args(arguments.split(' ')).status().expect("ip is there");
     assert!(done.success(), "ip {arguments}");
+}
+
+/// By another process: a descriptor of this one that is open for writing may be in a child that another test starts,
+/// and a program that is open for writing cannot be started.
+fn copy_program(from: &Path, to: &Path) {
+    let copied = Command::new("cp").arg("--").arg(from).arg(to).status();
+    assert!(copied.is_ok_and(|status| status.success()), "{}", to.display());
 }
 
 impl Bench {
@@ -60,11 +95,12 @@ impl Bench {
         fs::create_dir_all(&place).expect("it can be made");
         fs::set_permissions(&place, fs::Permissions::from_mode(0o777)).expect("it is ours");
         fs::write(place.join("segment.toml"), segment).expect("it can be written");
-        fs::copy(std::env::current_exe().expect("it is known"), place.join("test")).expect("it is read");
+        copy_program(&std::env::current_exe().expect("it is known"), &place.join("test"));
         for namespace in [&near, &far] {
             ip(&format!("netns add {namespace}"));
         }
-        let bench = Bench { near, far, place, processes: Vec::new(), lines: Arc::default(), _turn: turn };
+        let bench =
+            Bench { near, far, place, processes: Vec::new(), inputs: Vec::new(), lines: Arc::default(), _turn: turn };
         links.iter().for_each(|link| bench.plug_in(*link));
         Some(bench)
     }
@@ -87,7 +123,9 @@ impl Bench {
     /// Starts the segment at the far ends of these links.
     pub fn start_segment(&mut self, links: &str) {
         let mut segment = self.role(&self.far, "segment", &[]);
-        self.processes.push(segment.env(LINKS, links).spawn().expect("it starts"));
+        let mut segment = segment.env(LINKS, links).stdin(Stdio::piped()).spawn().expect("it starts");
+        self.inputs.extend(segment.stdin.take());
+        self.processes.push(segment);
     }
 
     /// Starts a daemon in the near namespace with these options; its number, to kill it.
@@ -98,7 +136,7 @@ impl Bench {
     /// The same as a user without a right.
     pub fn start_daemon_as_user(&mut self, options: &[&str]) -> usize {
         let program = self.place.join("ringcatd");
-        fs::copy(env!("CARGO_BIN_EXE_ringcatd"), &program).expect("it can be copied");
+        copy_program(env!("CARGO_BIN_EXE_ringcatd").as_ref(), &program);
         let program = program.to_str().expect("it is text");
         // Files of root beside the socket stay.
         for entry in fs::read_dir(&self.place).expect("it is there").flatten() {
@@ -145,7 +183,7 @@ impl Bench {
     /// Whether a web server at this address answers in the near namespace.
     pub fn fetches(&self, address: &str) -> bool {
         let mut fetch = self.role(&self.near, "fetch", &[]);
-        fetch.env(ADDRESS, address).stderr(Stdio::null()).status().expect("it runs").success()
+        fetch.env(ADDRESS, address).stdin(Stdio::null()).stderr(Stdio::null()).status().expect("it runs").success()
     }
 
     pub fn socket(&self) -> PathBuf {
@@ -193,9 +231,12 @@ impl Bench {
     }
 
     /// An application without a right.
-    pub fn application(&mut self, role: &str) -> Child {
+    pub fn application(&mut self, role: &str) -> Application {
         let user = ["prlimit", "--core=unlimited", "setpriv", "--reuid", USER, "--regid", USER, "--clear-groups"];
-        self.role(&self.near, role, &user).spawn().expect("it starts")
+        let mut application = self.role(&self.near, role, &user).stdin(Stdio::piped()).spawn().expect("it starts");
+        // Not with the child, which closes it before it is waited for.
+        self.inputs.extend(application.stdin.take());
+        Application(application)
     }
 
     /// AL states as the SubDevices have them.

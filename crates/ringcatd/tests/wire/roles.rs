@@ -46,11 +46,22 @@ fn a_process_of_another_test_plays_its_role() {
     let (Ok(role), Some(place)) = (std::env::var(ROLE), std::env::var_os(PLACE)) else { return };
     let place = PathBuf::from(place);
     match role.as_str() {
-        "segment" => segment(&place),
         "fetch" => fetch(),
-        "switch" => switch(&place),
-        role => application(&place, role),
+        role => {
+            std::thread::spawn(end_with_the_test);
+            match role {
+                "segment" => segment(&place),
+                "switch" => switch(&place),
+                role => application(&place, role),
+            }
+        }
     }
+}
+
+/// The test holds the other end of the input: it is closed when the test has ended, however it has.
+fn end_with_the_test() {
+    let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
+    std::process::exit(1);
 }
 
 /// Asks a web server: fails if it does not answer.
