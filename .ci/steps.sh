@@ -131,16 +131,6 @@ dependencies() {
     fi
 }
 
-# idle FUNCTION: runs it where nothing else wants the processor.
-idle() {
-    if command -v chrt >/dev/null; then
-        chrt --idle --pid 0 "$BASHPID"
-    else
-        renice --priority 19 "$BASHPID" >/dev/null
-    fi
-    "$@"
-}
-
 # The programs of the benches, the demonstration's among them, and the client of ethercrab.
 release_programs() {
     # The same selection as in ci/bench: another one has other features, and everything is built twice.
