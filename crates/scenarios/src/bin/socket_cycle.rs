@@ -235,7 +235,7 @@ fn print_profile(name: &str, profile: &Profile) {
 
 fn cpu_and_memory(namespaces: &Namespaces) -> Tried<bool> {
     let mut figures = Figures::new("CPU time (user and system) at 1 kHz, 50 servos, two threads; resident memory");
-    // Of libraries the kernel maps more or fewer pages around a fault, whatever the program does: the least of all runs.
+    // The kernel maps more or fewer pages of libraries around a fault, whatever the program does: the least counts.
     let mut least: Option<(f64, Vec<String>)> = None;
     for mode in ["block", "hybrid", "busy"] {
         let _simulator = simulate(namespaces, 50, 1_000)?;
