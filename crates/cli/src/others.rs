@@ -6,27 +6,17 @@
 //! interface below the packet sockets (AF_XDP) and sends nothing meanwhile.
 
 use std::fmt;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
+use ringcat::foreign::{LAST_FRAMES, LISTEN, has_commands};
 use ringcat::text::{address, address_of_sender};
-use ringcat::wire::frame::{ETHERNET_HEADER_LEN, MacAddress};
+use ringcat::wire::frame::MacAddress;
 use ringcat_link::interface::{UseWarning, exclusive_use};
 use ringcat_link::pcapng::Direction;
 use ringcat_link::{PacketSocket, ReceiveMode, Sniffer, monotonic};
 
 use crate::failure::Failure;
 use crate::output::warn;
-
-/// How long frames are listened for: longer than the cycle of all but the slowest MainDevices.
-const LISTEN: Duration = Duration::from_millis(250);
-/// What comes before may still be the frames of a MainDevice that has just ended.
-const LAST_FRAMES: Duration = Duration::from_millis(25);
-/// EtherType, and a VLAN tag before it.
-const ETHERCAT: [u8; 2] = [0x88, 0xA4];
-const VLAN: [u8; 2] = [0x81, 0x00];
-const TAG: usize = 4;
-/// Type of the EtherCAT header that commands for SubDevices have; others are network variables and mailboxes.
-const COMMANDS: u8 = 1;
 
 /// What to do about it.
 const ADVICE: &str = "nothing was sent: stop the other one first. --force goes on all the same, and its SubDevices\n\
@@ -95,35 +85,9 @@ fn refuse(found: &[String]) -> Result<(), Failure> {
     if found.is_empty() { Ok(()) } else { Err(Failure::new(format!("{}\n{ADVICE}", found.join("\n")))) }
 }
 
-/// Whether a frame holds datagrams for SubDevices.
-fn has_commands(frame: &[u8]) -> bool {
-    let tag = if frame.get(12..14) == Some(&VLAN) { TAG } else { 0 };
-    let header_at = ETHERNET_HEADER_LEN + tag;
-    frame.get(header_at - 2..header_at) == Some(&ETHERCAT)
-        && frame.get(header_at + 1).is_some_and(|high| high >> 4 == COMMANDS)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn frame(ether_type: &[u8], high: u8) -> Vec<u8> {
-        let mut frame = vec![0xff; 12];
-        frame.extend(ether_type);
-        frame.extend([0x0e, high]);
-        frame.resize(60, 0);
-        frame
-    }
-
-    // covers: other-main-device
-    #[test]
-    fn only_frames_with_commands_show_a_main_device() {
-        assert!(has_commands(&frame(&ETHERCAT, 0x10)));
-        assert!(has_commands(&frame(&[0x81, 0x00, 0x00, 0x05, 0x88, 0xa4], 0x10)));
-        assert!(!has_commands(&frame(&ETHERCAT, 0x40)), "network variables");
-        assert!(!has_commands(&frame(&[0x08, 0x00], 0x10)), "IP");
-        (0..16).for_each(|length| assert!(!has_commands(&frame(&ETHERCAT, 0x10)[..length.min(15)])));
-    }
 
     #[test]
     fn each_finding_is_reported_with_what_to_do() {

@@ -36,9 +36,17 @@ pub struct Arguments {
     pub emergency: bool,
     /// `--help`.
     pub help: bool,
+    /// `--main`: the network interface of a bus without a daemon.
+    pub main: Option<String>,
+    /// `--redundant`: that at the other end of a ring.
+    pub redundant: Option<String>,
+    /// `--sim`: a segment file to simulate.
+    pub sim: Option<String>,
+    /// `--follow`.
+    pub follow: bool,
 }
 
-/// All options: letter, name, and whether a value follows.
+/// Options of the original tool: letter, name, and whether a value follows.
 pub const OPTIONS: [(char, &str, bool); 12] = [
     ('m', "master", true),
     ('a', "alias", true),
@@ -53,6 +61,10 @@ pub const OPTIONS: [(char, &str, bool); 12] = [
     ('e', "emergency", false),
     ('h', "help", false),
 ];
+
+/// Options of our own: name, and whether a value follows. An abbreviation means one of them only where it means none of [`OPTIONS`]:
+/// scripts for the original tool go on working.
+pub const OWN: [(&str, bool); 4] = [("main", true), ("redundant", true), ("sim", true), ("follow", false)];
 
 impl Arguments {
     /// Reads the words of a command line, the name of the program left out.
@@ -82,27 +94,25 @@ impl Arguments {
 
     fn take_long<'a>(&mut self, text: &str, next: &mut Next<'_, 'a>) -> Result<(), String> {
         let (name, given) = text.split_once('=').map_or((text, None), |(name, value)| (name, Some(value)));
-        let mut fitting = OPTIONS.iter().filter(|(_, long, _)| long.starts_with(name));
-        let exact = OPTIONS.iter().find(|(_, long, _)| *long == name);
-        let only = fitting.next().filter(|_| fitting.next().is_none());
-        let Some((letter, long, has_value)) = exact.or(only).filter(|_| !name.is_empty()) else {
+        let Some((long, has_value)) = find(name) else {
             return Err(format!("there is no option --{name}, or several begin like this"));
         };
         match (has_value, given) {
-            (false, Some(_)) => Err(format!("option --{long} takes no value")),
-            (false, None) => self.set(*letter, ""),
-            (true, Some(value)) => self.set(*letter, value),
+            (false, Some(_)) => return Err(format!("option --{long} takes no value")),
+            (false, None) => self.set(long, ""),
+            (true, Some(value)) => self.set(long, value),
             (true, None) => {
                 let value = next()?.ok_or_else(|| format!("option --{long} requires a value"))?;
-                self.set(*letter, value)
+                self.set(long, value);
             }
         }
+        Ok(())
     }
 
     fn take_short<'a>(&mut self, mut letters: &str, next: &mut Next<'_, 'a>) -> Result<(), String> {
         while let Some(letter) = letters.chars().next() {
             letters = &letters[letter.len_utf8()..];
-            let Some((_, _, has_value)) = OPTIONS.iter().find(|(own, ..)| *own == letter) else {
+            let Some((_, long, has_value)) = OPTIONS.iter().find(|(own, ..)| *own == letter) else {
                 return Err(format!("there is no option -{letter}"));
             };
             if *has_value {
@@ -110,37 +120,58 @@ impl Arguments {
                     "" => next()?.ok_or_else(|| format!("option -{letter} requires a value"))?,
                     rest => rest,
                 };
-                return self.set(letter, value);
+                self.set(long, value);
+                return Ok(());
             }
-            self.set(letter, "")?;
+            self.set(long, "");
         }
         Ok(())
     }
 
-    fn set(&mut self, letter: char, value: &str) -> Result<(), String> {
-        let text = match letter {
-            'm' => &mut self.master,
-            'a' => &mut self.alias,
-            'p' => &mut self.position,
-            'd' => &mut self.domain,
-            't' => &mut self.data_type,
-            's' => &mut self.skin,
-            'o' => &mut self.output_file,
+    /// Sets an option by its name.
+    fn set(&mut self, name: &str, value: &str) {
+        let text = match name {
+            "master" => &mut self.master,
+            "alias" => &mut self.alias,
+            "position" => &mut self.position,
+            "domain" => &mut self.domain,
+            "type" => &mut self.data_type,
+            "skin" => &mut self.skin,
+            "output-file" => &mut self.output_file,
+            "main" => &mut self.main,
+            "redundant" => &mut self.redundant,
+            "sim" => &mut self.sim,
             _ => {
-                let flag = match letter {
-                    'f' => &mut self.force,
-                    'q' => &mut self.quiet,
-                    'v' => &mut self.verbose,
-                    'e' => &mut self.emergency,
+                let flag = match name {
+                    "force" => &mut self.force,
+                    "quiet" => &mut self.quiet,
+                    "verbose" => &mut self.verbose,
+                    "emergency" => &mut self.emergency,
+                    "follow" => &mut self.follow,
                     _ => &mut self.help,
                 };
                 *flag = true;
-                return Ok(());
+                return;
             }
         };
         *text = Some(value.to_owned());
-        Ok(())
     }
+}
+
+/// The option with this name, or the only one that begins with it; whether a value follows.
+fn find(name: &str) -> Option<(&'static str, bool)> {
+    let theirs = || OPTIONS.iter().map(|(_, long, has_value)| (*long, *has_value));
+    let own = || OWN.iter().copied();
+    let exact = theirs().chain(own()).find(|(long, _)| *long == name);
+    let begin = |(long, _): &(&str, bool)| !name.is_empty() && long.starts_with(name);
+    exact.or_else(|| {
+        let fitting: Vec<_> = theirs().filter(begin).collect();
+        let fitting = if fitting.is_empty() { own().filter(begin).collect() } else { fitting };
+        match fitting[..] {
+            [one] => Some(one),
+            _ => None,
+        }
+    })
 }
 
 type Next<'f, 'a> = dyn FnMut() -> Result<Option<&'a str>, String> + 'f;
@@ -180,6 +211,19 @@ mod tests {
         let arguments = parse("download -t int8 0x2000 0 -5 - -- -v");
         assert_eq!(arguments.words, ["download", "0x2000", "0", "-5", "-", "-v"]);
         assert!(!arguments.verbose);
+    }
+
+    // covers: daemon
+    #[test]
+    fn abbreviations_mean_options_of_our_own_only_where_they_mean_no_other() {
+        assert_eq!(parse("slaves --ma 1").master.as_deref(), Some("1"));
+        assert_eq!(parse("pdos --s etherlab").skin.as_deref(), Some("etherlab"));
+        assert!(parse("alias --fo 1").force && parse("events --fol").follow);
+        for text in ["slaves --main eth1", "slaves --mai=eth1"] {
+            assert_eq!(parse(text).main.as_deref(), Some("eth1"), "{text}");
+        }
+        assert_eq!(parse("slaves --si a.toml").sim.as_deref(), Some("a.toml"));
+        assert_eq!(parse("slaves --r=eth2").redundant.as_deref(), Some("eth2"));
     }
 
     // covers: daemon

@@ -10,6 +10,7 @@ pub mod debug;
 pub mod domains;
 pub mod download;
 pub mod eoe;
+pub mod events;
 pub mod foe_read;
 pub mod foe_write;
 pub mod graph;

@@ -4,7 +4,7 @@ use crate::command;
 use crate::shape::Command;
 
 /// All commands by name.
-pub const ALL: [&Command; 28] = [
+pub const ALL: [&Command; 29] = [
     &command::alias::COMMAND,
     &command::config::COMMAND,
     &command::crc::COMMAND,
@@ -14,6 +14,7 @@ pub const ALL: [&Command; 28] = [
     &command::domains::COMMAND,
     &command::download::COMMAND,
     &command::eoe::COMMAND,
+    &command::events::COMMAND,
     &command::foe_read::COMMAND,
     &command::foe_write::COMMAND,
     &command::graph::COMMAND,
@@ -35,6 +36,10 @@ pub const ALL: [&Command; 28] = [
     &command::xml::COMMAND,
 ];
 
+/// Commands that the original tool does not have. An abbreviation means one of them only where it means none of the
+/// others: scripts go on working.
+pub const OWN: [&str; 1] = ["events"];
+
 /// What an abbreviation stands for.
 #[derive(Debug)]
 #[non_exhaustive]
@@ -52,11 +57,14 @@ pub fn find(text: &str) -> Found {
     if let Some(exact) = ALL.into_iter().find(|command| command.name == text) {
         return Found::One(exact);
     }
-    let fitting = |fits: fn(&str, &str) -> bool| ALL.into_iter().filter(|it| fits(it.name, text)).collect::<Vec<_>>();
-    let mut found = fitting(|name, text| name.starts_with(text));
-    if found.is_empty() {
-        found = fitting(has_letters);
-    }
+    let begins = |name: &str, text: &str| name.starts_with(text);
+    let fitting = |own: bool, fits: fn(&str, &str) -> bool| {
+        let fits = |it: &&Command| OWN.contains(&it.name) == own && fits(it.name, text);
+        ALL.into_iter().filter(fits).collect::<Vec<_>>()
+    };
+    let ways = [(false, begins as fn(&str, &str) -> bool), (false, has_letters), (true, begins)];
+    let found = ways.into_iter().map(|(own, fits)| fitting(own, fits)).find(|found| !found.is_empty());
+    let found = found.unwrap_or_default();
     match found[..] {
         [] => Found::None,
         [one] => Found::One(one),
@@ -99,5 +107,7 @@ mod tests {
         assert_eq!(names("siir"), ["sii_read", "sii_write"]);
         assert_eq!(names("dw"), ["download"]);
         assert!(names("xyz").is_empty());
+        assert_eq!(names("ev"), ["events"]);
+        assert!(OWN.iter().all(|own| ALL.iter().any(|command| command.name == *own)));
     }
 }

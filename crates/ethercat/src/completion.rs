@@ -2,15 +2,18 @@
 
 use std::fmt::Write;
 
-use crate::arguments::OPTIONS;
+use crate::arguments::{OPTIONS, OWN};
 use crate::commands::ALL;
 use crate::options_help::{OptionHelp, common, of};
 use crate::shape::Command;
 
 /// Words with which options of a command are written.
 fn words(options: &[OptionHelp]) -> String {
-    let words: Vec<String> = options.iter().map(|option| format!("--{} -{}", option.name, option.letter)).collect();
-    words.join(" ")
+    let words = |option: &OptionHelp| match option.letter {
+        "" => format!("--{}", option.name),
+        letter => format!("--{} -{letter}", option.name),
+    };
+    options.iter().map(words).collect::<Vec<_>>().join(" ")
 }
 
 /// Words that a command may have as they are: those in its forms that are no place-holders.
@@ -30,6 +33,7 @@ pub fn bash() -> String {
         .iter()
         .filter(|(.., has_value)| *has_value)
         .map(|(letter, name, _)| format!("-{letter}|--{name}"))
+        .chain(OWN.iter().filter(|(_, has_value)| *has_value).map(|(name, _)| format!("--{name}")))
         .collect();
     let mut cases = String::new();
     for command in ALL {
@@ -70,7 +74,10 @@ fn zsh_option(option: &OptionHelp) -> String {
     let OptionHelp { name, letter, value, text } = option;
     let text = quoted(text);
     let value = if value.is_empty() { String::new() } else { format!(":{value}:_default") };
-    format!("'(-{letter} --{name})'{{-{letter},--{name}}}'[{text}]{value}'")
+    match *letter {
+        "" => format!("'--{name}[{text}]{value}'"),
+        letter => format!("'(-{letter} --{name})'{{-{letter},--{name}}}'[{text}]{value}'"),
+    }
 }
 
 /// For zsh: `_ethercat` in a directory of `fpath`.
@@ -102,7 +109,8 @@ pub fn zsh() -> String {
 fn fish_option(option: &OptionHelp, condition: &str) -> String {
     let OptionHelp { name, letter, value, text } = option;
     let value = if value.is_empty() { "" } else { " -r" };
-    format!("complete -c ethercat{condition} -l {name} -s {letter}{value} -d '{}'\n", quoted(text))
+    let letter = if letter.is_empty() { String::new() } else { format!(" -s {letter}") };
+    format!("complete -c ethercat{condition} -l {name}{letter}{value} -d '{}'\n", quoted(text))
 }
 
 /// For fish: `/usr/share/fish/vendor_completions.d/ethercat.fish`.

@@ -68,6 +68,11 @@ impl Failure {
     }
 }
 
+/// The daemon answers something else; one of this version does not.
+pub fn unexpected() -> Failure {
+    Failure::failed("The daemon has answered another question.")
+}
+
 impl From<ClientError> for Failure {
     fn from(error: ClientError) -> Failure {
         Failure::Asked(error)

@@ -14,6 +14,14 @@ pub const COMMON: &str = "  --master  -m <master>  Masters: comma-separated numb
   --help    -h           Show this help, or that of the command.
 ";
 
+/// Options of all commands for a bus without a daemon.
+pub const STANDALONE: &str = "  --main <interface>       Drive the bus at this network interface for the length
+                           of the command, without a daemon. Its slaves are
+                           brought to PREOP, and stay there.
+  --redundant <interface>  That at the other end of a ring.
+  --sim <file>             Simulate this segment file instead.
+";
+
 /// How numbers are written.
 pub const NUMBERS: &str = "Numbers are decimal, octal with 0 before them, or hexadecimal with 0x\nbefore them.\n";
 
@@ -27,6 +35,8 @@ pub fn usage() -> String {
     }
     text += "\nOptions of all commands:\n";
     text += COMMON;
+    text += "\nWithout a daemon:\n";
+    text += STANDALONE;
     text.push('\n');
     text + NUMBERS + "Call 'ethercat <COMMAND> --help' for more about a command.\n"
 }

@@ -4,6 +4,7 @@
 //! * [`arguments`]: options and words of the command line; [`numbers`]: numbers and lists of them;
 //! * [`shape`]: what a command is; [`commands`]: all of them, found by abbreviations; [`help`]: how they are used;
 //! * [`completion`], [`manual`]: scripts for shells and manual pages, from [`options_help`] and the same help;
+//! * [`standalone`]: a bus without a daemon, for one command;
 //! * [`session`]: the daemon and its masters; [`selection`]: SubDevices by alias and position;
 //! * [`data_types`]: values of objects, registers and IDNs; [`aborts`]: codes of refusals;
 //! * `command`: one file per command.
@@ -29,6 +30,7 @@ pub mod selection;
 pub mod selection_help;
 pub mod session;
 pub mod shape;
+pub mod standalone;
 
 use std::ffi::OsString;
 use std::io::Write;
@@ -75,6 +77,7 @@ fn try_run(words: &[OsString], socket: &Path, output: &mut dyn Write, errors: &m
         output.write_all(help::of(command).as_bytes())?;
         return Ok(());
     }
-    let mut session = Session::new(command.name, arguments, socket, output, errors);
+    let links = standalone::links(&arguments).map_err(wrong)?;
+    let mut session = Session::new(command.name, arguments, socket, output, errors).with_links(links);
     (command.run)(&mut session).map_err(|failure| failure.with_help(|| help::of(command)))
 }

@@ -29,8 +29,9 @@ fn options(title: &str, options: &[OptionHelp]) -> String {
     let mut text = format!(".SH {title}\n");
     for OptionHelp { name, letter, value, text: about } in options {
         let value = if value.is_empty() { String::new() } else { format!(" \\fI{}\\fR", roff(value)) };
+        let letter = if letter.is_empty() { String::new() } else { format!("\\fB\\-{letter}\\fR, ") };
         // A string takes everything; so below.
-        let _ = write!(text, ".TP\n\\fB\\-{letter}\\fR, \\fB\\-\\-{}\\fR{value}\n{}\n", roff(name), roff(about));
+        let _ = write!(text, ".TP\n{letter}\\fB\\-\\-{}\\fR{value}\n{}\n", roff(name), roff(about));
     }
     text
 }

@@ -1,6 +1,6 @@
 //! Options as the help describes them, for completion and manual pages.
 
-use crate::help::COMMON;
+use crate::help::{COMMON, STANDALONE};
 use crate::shape::Command;
 
 /// An option in the help.
@@ -9,7 +9,7 @@ use crate::shape::Command;
 pub struct OptionHelp {
     /// Its name, without minus signs.
     pub name: &'static str,
-    /// Its letter.
+    /// Its letter; empty if it has none.
     pub letter: &'static str,
     /// The name of its value; empty if it takes none.
     pub value: &'static str,
@@ -19,7 +19,9 @@ pub struct OptionHelp {
 
 /// The options that all commands have.
 pub fn common() -> Vec<OptionHelp> {
-    options(COMMON)
+    let mut all = options(COMMON);
+    all.extend(options(STANDALONE));
+    all
 }
 
 /// A command's own options.
@@ -40,7 +42,7 @@ fn options(text: &'static str) -> Vec<OptionHelp> {
             continue;
         };
         let (name, rest) = word(option);
-        let (letter, rest) = word(rest);
+        let (letter, rest) = if rest.starts_with('-') { word(rest) } else { ("", rest) };
         let (value, rest) = match rest.strip_prefix('<') {
             Some(value) => value.split_once('>').unwrap_or((value, "")),
             None => ("", rest),
@@ -58,7 +60,7 @@ fn word(text: &str) -> (&str, &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arguments::OPTIONS;
+    use crate::arguments::{OPTIONS, OWN};
     use crate::commands::ALL;
 
     // covers: daemon
@@ -70,9 +72,10 @@ mod tests {
             let is_known = |(letter, name, has_value): &(char, &str, bool)| {
                 wanted == (*name, letter.to_string().as_str(), *has_value) && option.text.len() > 5
             };
-            assert!(OPTIONS.iter().any(is_known), "{option:?}");
+            let is_own = option.letter.is_empty() && OWN.contains(&(option.name, !option.value.is_empty()));
+            assert!(OPTIONS.iter().any(is_known) || is_own, "{option:?}");
         }
-        for (_, name, _) in OPTIONS {
+        for name in OPTIONS.map(|(_, name, _)| name).into_iter().chain(OWN.map(|(name, _)| name)) {
             assert!(all().any(|option| option.name == name), "--{name} is not in the help");
         }
     }

@@ -11,9 +11,10 @@ use ringcat_control::tool::{MOST_SUBDEVICES, Piece, SubDeviceLine, ToolAnswer, T
 use ringcat_control::{Client, Refusal};
 
 use crate::arguments::Arguments;
-use crate::failure::Failure;
+use crate::failure::{Failure, unexpected};
 use crate::numbers::List;
 use crate::selection::{self, Slave};
+use crate::standalone::Standalone;
 
 /// A command at work.
 pub struct Session<'a> {
@@ -23,6 +24,9 @@ pub struct Session<'a> {
     pub arguments: Arguments,
     socket: &'a Path,
     client: Option<Client>,
+    /// Links of a bus without a daemon, until it is used.
+    links: Option<String>,
+    standalone: Option<Standalone>,
     output: &'a mut dyn Write,
     errors: &'a mut dyn Write,
 }
@@ -41,7 +45,13 @@ impl<'a> Session<'a> {
         output: &'a mut dyn Write,
         errors: &'a mut dyn Write,
     ) -> Session<'a> {
-        Session { name, arguments, socket, client: None, output, errors }
+        Session { name, arguments, socket, client: None, links: None, standalone: None, output, errors }
+    }
+
+    /// On these links instead, which a daemon of this command drives from the first question on.
+    #[must_use]
+    pub fn with_links(self, links: Option<String>) -> Session<'a> {
+        Session { links, ..self }
     }
 
     /// The arguments behind the command.
@@ -65,6 +75,14 @@ impl<'a> Session<'a> {
         Ok(self.output.write_fmt(text)?)
     }
 
+    /// Passes on what was written so far.
+    ///
+    /// # Errors
+    /// The output is closed.
+    pub fn flush(&mut self) -> Result<(), Failure> {
+        Ok(self.output.flush()?)
+    }
+
     /// Says something on the standard error.
     pub fn say(&mut self, text: &str) {
         // Where it is closed nothing can be said.
@@ -78,11 +96,15 @@ impl<'a> Session<'a> {
         }
     }
 
-    fn client(&mut self) -> Result<&mut Client, ClientError> {
-        if self.client.is_none() {
-            self.client = Some(Client::connect(self.socket, "ethercat")?);
+    fn client(&mut self) -> Result<&mut Client, Failure> {
+        if let Some(links) = self.links.take() {
+            self.standalone = Some(Standalone::start(&links)?);
         }
-        self.client.as_mut().ok_or(ClientError::Refused(Refusal::Unexpected { expected: "a daemon".to_owned() }))
+        if self.client.is_none() {
+            let own = self.standalone.as_ref().map(Standalone::socket);
+            self.client = Some(Client::connect(own.as_deref().unwrap_or(self.socket), "ethercat")?);
+        }
+        self.client.as_mut().ok_or_else(unexpected)
     }
 
     /// Asks about a master; `bytes` is data to write. Returns data that was read, too.
@@ -228,9 +250,4 @@ impl<'a> Session<'a> {
             }
         }
     }
-}
-
-/// The daemon answers something else; one of this version does not.
-pub fn unexpected() -> Failure {
-    Failure::failed("The daemon has answered another question.")
 }

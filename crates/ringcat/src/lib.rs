@@ -73,6 +73,7 @@ mod error;
 #[cfg(feature = "esi")]
 pub mod esi;
 pub mod event_log;
+pub mod foreign;
 #[cfg(feature = "gateway")]
 pub mod gateway;
 // The pages of docs/guide, for rustdoc and its tests.

@@ -3,8 +3,9 @@
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use ringcat::daemon::{BusLog, Followed, Lines, adopt_links, serving};
+use ringcat::daemon::{BusLog, Followed, HandedLink, Lines, adopt_links, serving};
 use ringcat::eoe::{Ethernet, EthernetEvent, EthernetOptions};
+use ringcat::foreign::listen;
 use ringcat::{
     Activity, AlState, Error, Handover, Knowledge, Links, LogFilter, LogLevel, Options, Retries, Services, StateScope,
     SupervisorThread,
@@ -38,6 +39,8 @@ pub struct Lasting<'a> {
     pub debug_level: u32,
     /// Network interfaces of EoE; `None`: there are none.
     pub interfaces: Option<Arc<EthernetInterfaces>>,
+    /// The daemon has driven the master before. Otherwise another MainDevice may: it listens first.
+    pub is_known: bool,
 }
 
 /// The daemon drives a master.
@@ -56,7 +59,11 @@ impl Driving {
     /// What is wrong, for the operator.
     pub fn start(opened: &Opened, lasting: &Lasting<'_>, handover: Handover) -> Result<Driving, String> {
         let adopted = adopt_links(opened.links(), opened.duplicates()?);
-        let (cyclic, acyclic) = adopted.map_err(|error| error.to_string())?;
+        let (mut cyclic, mut acyclic) = adopted.map_err(|error| error.to_string())?;
+        let is_shared = !lasting.is_known && matches!(opened.links().main, HandedLink::Interface { .. });
+        if let Some(heard) = is_shared.then(|| listen(&mut cyclic, &mut acyclic)).flatten() {
+            return Err(heard.to_string());
+        }
         let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
         let supervisor = match Knowledge::from_bytes(lasting.knowledge) {
             Ok(knowledge) => SupervisorThread::start_resumed(acyclic, &options, (knowledge, handover), || ()),

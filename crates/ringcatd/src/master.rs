@@ -4,7 +4,7 @@
 //! each time it comes back, so that nothing that had it before reaches the segment any more.
 
 use std::os::fd::AsRawFd;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -69,6 +69,8 @@ pub struct Master {
     lines: Arc<Mutex<Lines>>,
     /// Level of messages, whatever drives the master.
     debug_level: AtomicU32,
+    /// The daemon has driven it: no other MainDevice does.
+    is_known: AtomicBool,
 }
 
 /// How the time of an owner has ended.
@@ -133,6 +135,7 @@ impl Master {
             knowledge: Mutex::default(),
             lines: Arc::default(),
             debug_level: AtomicU32::new(debug_level),
+            is_known: AtomicBool::new(false),
         };
         master.drive(Handover::Orderly);
         master.prepare();
@@ -394,8 +397,10 @@ impl Master {
         let knowledge = locked(&self.knowledge);
         let (lines, debug_level) = (self.lines.clone(), self.debug_level.load(Ordering::Acquire));
         let interfaces = self.interfaces.clone();
-        let lasting = Lasting { number: self.number, knowledge: &knowledge, lines, debug_level, interfaces };
+        let is_known = self.is_known.load(Ordering::Acquire);
+        let lasting = Lasting { number: self.number, knowledge: &knowledge, lines, debug_level, interfaces, is_known };
         let driving = Driving::start(&opened, &lasting, handover)?;
+        self.is_known.store(true, Ordering::Release);
         for absent in opened.absent() {
             say(format_args!("master {}: interface {absent} is not there; the ring goes on without it", self.number));
         }

@@ -50,6 +50,9 @@ pub fn run(setup: &Setup) -> Result<(), String> {
     let has_interfaces = setup.masters.iter().any(|it| matches!(it.source, Source::Interfaces(..)));
     let opener = Arc::new(if has_interfaces { Opener::start()? } else { Opener::Here });
     keep(Capabilities::ADMIN).map_err(|error| format!("capabilities cannot be given up: {error}"))?;
+    if setup.ends_with_input {
+        end_with_input()?;
+    }
     let mut up_down = UpDown::start(&setup.up_down);
     let mut masters = Vec::new();
     for option in &setup.masters {
@@ -64,6 +67,16 @@ pub fn run(setup: &Setup) -> Result<(), String> {
     up_down.end(is_driven);
     flush();
     Ok(())
+}
+
+/// The daemon of one command ends with that command, however that ends: nobody else has its socket.
+fn end_with_input() -> Result<(), String> {
+    let body = || {
+        let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
+        std::process::exit(0);
+    };
+    let started = std::thread::Builder::new().name("input".into()).spawn(body);
+    started.map(drop).map_err(|error| format!("a thread cannot be started: {error}"))
 }
 
 /// Starts a master.

@@ -50,6 +50,9 @@ pub struct Given {
     /// when applications begin and end. Needs CAP_NET_ADMIN.
     #[arg(long)]
     pub no_eoe: bool,
+    /// End with the standard input: the daemon of one command
+    #[arg(long, hide = true)]
+    pub while_input_is_open: bool,
 }
 
 /// What the daemon does.
@@ -73,6 +76,8 @@ pub struct Setup {
     pub debug_level: u32,
     /// A master waits until its backup interface is there.
     pub needs_backup: bool,
+    /// It ends with the standard input.
+    pub ends_with_input: bool,
 }
 
 impl Setup {
@@ -101,6 +106,7 @@ impl Setup {
             up_down,
             debug_level: own.debug_level.unwrap_or(0),
             needs_backup: own.needs_backup,
+            ends_with_input: given.while_input_is_open,
         })
     }
 

@@ -3,9 +3,9 @@
 use ringcat_control::tool::{DeclaredLine, MOST_DECLARED, Piece, ToolAnswer, ToolQuery};
 
 use super::config_details::details;
-use crate::failure::Failure;
+use crate::failure::{Failure, unexpected};
 use crate::selection::{self, Slave};
-use crate::session::{Session, unexpected};
+use crate::session::Session;
 use crate::shape::Command;
 
 /// The command.

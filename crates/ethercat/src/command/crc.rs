@@ -3,9 +3,9 @@
 use ringcat_control::message::Query;
 use ringcat_control::tool::{MOST_SUBDEVICES, Piece, PortLine, PortsLine, ToolAnswer, ToolQuery};
 
-use crate::failure::Failure;
+use crate::failure::{Failure, unexpected};
 use crate::selection::Slave;
-use crate::session::{Session, unexpected};
+use crate::session::Session;
 use crate::shape::Command;
 
 /// Register RX_ERROR_COUNTER, where all counters begin.

@@ -3,9 +3,9 @@
 use ringcat_control::message::{Answer, Query};
 use ringcat_control::tool::{DomainLine, ToolAnswer, ToolQuery};
 
-use crate::failure::Failure;
+use crate::failure::{Failure, unexpected};
 use crate::hex;
-use crate::session::{Session, unexpected};
+use crate::session::Session;
 use crate::shape::Command;
 
 /// The command.

@@ -2,8 +2,8 @@
 
 use ringcat_control::tool::{EthernetLine, ToolAnswer, ToolQuery};
 
-use crate::failure::Failure;
-use crate::session::{Session, unexpected};
+use crate::failure::{Failure, unexpected};
+use crate::session::Session;
 use crate::shape::Command;
 
 /// The command.

@@ -7,8 +7,8 @@ use ringcat_control::message::MasterState;
 use ringcat_control::refusal::Refusal;
 use ringcat_control::tool::{LinkReport, MasterReport, ToolAnswer, ToolQuery, Traffic, TrafficRate};
 
-use crate::failure::Failure;
-use crate::session::{Session, unexpected};
+use crate::failure::{Failure, unexpected};
+use crate::session::Session;
 use crate::shape::Command;
 
 /// Bytes of a KByte.

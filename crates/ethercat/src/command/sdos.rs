@@ -5,8 +5,8 @@ use ringcat_wire::sii::MailboxProtocols;
 
 use super::slaves::description;
 use crate::data_types;
-use crate::failure::Failure;
-use crate::session::{Session, unexpected};
+use crate::failure::{Failure, unexpected};
+use crate::session::Session;
 use crate::shape::Command;
 
 /// Bit of CoE details: SDO information.

@@ -7,9 +7,9 @@ use ringcat_control::tool::{Description, ToolAnswer, ToolQuery};
 
 use super::crc::ports;
 use super::slave_details::details;
-use crate::failure::Failure;
+use crate::failure::{Failure, unexpected};
 use crate::selection::Slave;
-use crate::session::{Session, unexpected};
+use crate::session::Session;
 use crate::shape::Command;
 
 /// Register SYSTEM_TIME.

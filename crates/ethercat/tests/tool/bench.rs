@@ -23,7 +23,7 @@ use ringcatd::wires::Wires;
 
 /// SubDevices reach their states within this time on a busy machine.
 pub const LONG: Duration = Duration::from_secs(20);
-const PROGRAM: &str = env!("CARGO_BIN_EXE_ethercat");
+pub const PROGRAM: &str = env!("CARGO_BIN_EXE_ethercat");
 
 /// One daemon at a time: some tests have cycles that keep pace.
 static TURN: Mutex<()> = Mutex::new(());

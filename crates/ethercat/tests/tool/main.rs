@@ -5,6 +5,7 @@
 mod bench;
 mod beside;
 mod dot;
+mod events;
 mod golden;
 mod golden_bus;
 mod hostile;
@@ -13,3 +14,4 @@ mod operation;
 mod outputs;
 mod several;
 mod shells;
+mod standalone;

@@ -26,7 +26,7 @@ fn offered(words: &[&str]) -> Vec<String> {
 fn bash_offers_commands_and_their_options() {
     assert_eq!(offered(&["ethercat", "sl"]), ["slaves"]);
     assert_eq!(offered(&["ethercat", "-m", "0", "sii"]), ["sii_read", "sii_write"]);
-    assert_eq!(offered(&["ethercat", "pdos", "--s"]), ["--skin"]);
+    assert_eq!(offered(&["ethercat", "pdos", "--s"]), ["--skin", "--sim"]);
     assert_eq!(offered(&["ethercat", "crc", "r"]), ["reset"]);
     assert_eq!(offered(&["ethercat", "--quiet", "reg_write", "--em"]), ["--emergency"]);
     let all = offered(&["ethercat", ""]);

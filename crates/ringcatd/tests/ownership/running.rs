@@ -65,7 +65,23 @@ impl Running {
         Running::to(start, directory(), turn, stderr.into())
     }
 
+    /// With an input that the test holds open.
+    pub fn with_input(start: &Start) -> Running {
+        let turn = turn();
+        Running::between(start, directory(), turn, [Stdio::piped(), Stdio::piped()])
+    }
+
     fn to(start: &Start, directory: PathBuf, turn: MutexGuard<'static, ()>, stderr: Stdio) -> Running {
+        Running::between(start, directory, turn, [Stdio::inherit(), stderr])
+    }
+
+    /// With this standard input and standard error.
+    fn between(
+        start: &Start,
+        directory: PathBuf,
+        turn: MutexGuard<'static, ()>,
+        [stdin, stderr]: [Stdio; 2],
+    ) -> Running {
         let socket = directory.join("socket");
         let mut arguments = Vec::new();
         for (master, count) in start.counts.iter().enumerate() {
@@ -76,7 +92,7 @@ impl Running {
         arguments.extend(["--socket".into(), socket.clone().into_os_string()]);
         arguments.extend(start.options.iter().map(OsString::from));
         let mut command = command(&directory, &arguments, start);
-        command.stderr(stderr);
+        command.stdin(stdin).stderr(stderr);
         let mut child = command.spawn().expect("it starts");
         let lines = Arc::default();
         if let Some(stderr) = child.stderr.take() {

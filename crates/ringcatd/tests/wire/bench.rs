@@ -130,7 +130,12 @@ impl Bench {
 
     /// Starts a daemon in the near namespace with these options; its number, to kill it.
     pub fn start_daemon(&mut self, options: &[&str]) -> usize {
-        self.start_program(&[env!("CARGO_BIN_EXE_ringcatd")], options)
+        self.start_daemon_at(&self.socket(), options)
+    }
+
+    /// The same with another socket.
+    pub fn start_daemon_at(&mut self, socket: &Path, options: &[&str]) -> usize {
+        self.start_program(&[env!("CARGO_BIN_EXE_ringcatd")], options, socket)
     }
 
     /// The same as a user without a right.
@@ -144,13 +149,13 @@ impl Bench {
                 fs::remove_file(entry.path()).expect("it is ours");
             }
         }
-        self.start_program(&["setpriv", "--reuid", USER, "--regid", USER, "--clear-groups", program], options)
+        self.start_program(&["setpriv", "--reuid", USER, "--regid", USER, "--clear-groups", program], options, &self.socket())
     }
 
-    fn start_program(&mut self, program: &[&str], options: &[&str]) -> usize {
+    fn start_program(&mut self, program: &[&str], options: &[&str], socket: &Path) -> usize {
         let mut daemon = Command::new("ip");
         daemon.args(["netns", "exec", &self.near]).args(program).args(options);
-        daemon.args(["--group", USER]).arg("--socket").arg(self.socket()).stderr(Stdio::piped());
+        daemon.args(["--group", USER]).arg("--socket").arg(socket).stderr(Stdio::piped());
         let mut daemon = daemon.spawn().expect("it starts");
         let (stderr, lines) = (daemon.stderr.take().expect("it is piped"), self.lines.clone());
         std::thread::spawn(move || {
@@ -191,9 +196,14 @@ impl Bench {
     }
 
     pub fn client(&self) -> Client {
+        self.client_at(&self.socket())
+    }
+
+    /// A client of the daemon at this socket.
+    pub fn client_at(&self, socket: &Path) -> Client {
         let begin = Instant::now();
         loop {
-            match Client::connect(&self.socket(), "test") {
+            match Client::connect(socket, "test") {
                 Ok(client) => return client,
                 Err(error) => assert!(begin.elapsed() < LONG, "{error}; {:#?}", self.lines()),
             }

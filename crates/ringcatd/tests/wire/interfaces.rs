@@ -157,3 +157,37 @@ fn a_ring_with_one_interface_absent_is_driven_over_the_other() {
     bench.wait_for_line("master 0: interface near0 is there");
     bench.wait_for(AlState::PreOp);
 }
+
+// covers: daemon, other-main-device
+#[test]
+fn a_segment_that_another_main_device_controls_is_left_alone_until_that_ends() {
+    let Some(mut bench) = Bench::make(LINE, &[0]) else { return };
+    bench.start_segment("0");
+    let first = bench.start_daemon(&["--master", "0=near0"]);
+    bench.wait_for(AlState::PreOp);
+    let mut owner = bench.application("killed");
+    bench.wait_for(AlState::Op);
+    let socket = bench.place.join("second");
+    bench.start_daemon_at(&socket, &["--master", "0=near0"]);
+    let fault = |bench: &Bench| match bench.client_at(&socket).ask(0, Query::Masters, Vec::new()) {
+        Ok((Answer::Masters(masters), _)) => masters[0].fault.clone(),
+        other => panic!("{other:?}"),
+    };
+    let begin = Instant::now();
+    while begin.elapsed() < Duration::from_secs(3) {
+        let fault = fault(&bench);
+        let is_right = |text: &String| text.starts_with("another MainDevice controls this segment: its frames, from ");
+        assert!(fault.as_ref().is_some_and(is_right), "{fault:?}");
+        assert_eq!(bench.states(), "8 8 8 ");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    // The first daemon drives it without an application, and is heard as well.
+    owner.kill().expect("it runs");
+    owner.wait().expect("it has ended");
+    bench.wait_for(AlState::PreOp);
+    std::thread::sleep(Duration::from_secs(2));
+    assert!(fault(&bench).is_some(), "{:#?}", bench.lines());
+    bench.kill_daemon(first);
+    bench.wait_until("the second one drives it", || fault(&bench).is_none());
+    bench.wait_for(AlState::PreOp);
+}

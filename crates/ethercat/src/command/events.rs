@@ -1,0 +1,78 @@
+//! `events`: what has happened on the bus. Not a command of the original tool.
+
+use std::time::Duration;
+
+use ringcat_control::message::{Answer, EventLine, Query};
+
+use crate::failure::{Failure, unexpected};
+use crate::session::Session;
+use crate::shape::Command;
+
+/// Interval of questions.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// The command.
+pub const COMMAND: Command = Command {
+    name: "events",
+    summary: "Show events of the bus: states, cables, the ring, faults.",
+    forms: &[""],
+    help: "One line for each event: seconds since the host was started, and the
+event in words. The last 1024 or so are kept by the daemon, or by the
+application that drives the bus: each begins anew. With several masters a
+line begins with the number of its master. Not a command of IgH.
+",
+    options: "  --follow               Go on with events as they come, until Ctrl-C.
+",
+    run,
+};
+
+/// Events of a master that were shown.
+struct Shown {
+    master: u32,
+    /// Number of the next one.
+    next: u64,
+    /// Identifies the numbering, once it is known.
+    epoch: Option<u64>,
+}
+
+fn run(session: &mut Session<'_>) -> Result<(), Failure> {
+    let masters = session.masters()?;
+    let is_alone = masters.len() == 1;
+    let mut all: Vec<Shown> =
+        masters.iter().map(|it| Shown { master: it.master, next: 0, epoch: None }).collect();
+    loop {
+        for shown in &mut all {
+            while show(session, shown, is_alone)? {}
+        }
+        if !session.arguments.follow {
+            return Ok(());
+        }
+        session.flush()?;
+        std::thread::sleep(LOOK);
+    }
+}
+
+/// Shows events of a master from the next one on, as many as an answer has. Whether there may be more.
+fn show(session: &mut Session<'_>, shown: &mut Shown, is_alone: bool) -> Result<bool, Failure> {
+    let master = shown.master;
+    let (answer, _) = session.ask(master, Query::Events { from: shown.next }, Vec::new())?;
+    let Answer::Events { epoch, missed, next, events } = answer else { return Err(unexpected()) };
+    let is_same = shown.epoch.is_none_or(|before| before == epoch);
+    shown.epoch = Some(epoch);
+    if !is_same {
+        // Another process drives the master, and numbers its own events.
+        shown.next = 0;
+        return Ok(true);
+    }
+    if missed > 0 && shown.next > 0 {
+        session.say(&format!("{missed} events came too fast to be shown"));
+    }
+    for EventLine { at_ns, text, .. } in &events {
+        let (seconds, micros) = (at_ns / 1_000_000_000, at_ns / 1_000 % 1_000_000);
+        let of_master = if is_alone { String::new() } else { format!("{master}: ") };
+        write!(session, "{of_master}[{seconds:5}.{micros:06}] {text}\n")?;
+    }
+    let has_more = next > shown.next && !events.is_empty();
+    shown.next = next;
+    Ok(has_more)
+}
