@@ -1,6 +1,7 @@
 //! The commands, one file for each.
 
 pub mod alias;
+pub mod clocks;
 pub mod config;
 mod config_details;
 pub mod crc;
@@ -21,6 +22,7 @@ pub mod pdos;
 pub mod reg_read;
 pub mod reg_write;
 pub mod rescan;
+pub mod ring;
 pub mod sdos;
 mod sii_image;
 pub mod sii_read;

@@ -4,8 +4,9 @@ use crate::command;
 use crate::shape::Command;
 
 /// All commands by name.
-pub const ALL: [&Command; 29] = [
+pub const ALL: [&Command; 31] = [
     &command::alias::COMMAND,
+    &command::clocks::COMMAND,
     &command::config::COMMAND,
     &command::crc::COMMAND,
     &command::cstruct::COMMAND,
@@ -24,6 +25,7 @@ pub const ALL: [&Command; 29] = [
     &command::reg_read::COMMAND,
     &command::reg_write::COMMAND,
     &command::rescan::COMMAND,
+    &command::ring::COMMAND,
     &command::sdos::COMMAND,
     &command::sii_read::COMMAND,
     &command::sii_write::COMMAND,
@@ -38,7 +40,7 @@ pub const ALL: [&Command; 29] = [
 
 /// Commands that the original tool does not have. An abbreviation means one of them only where it means none of the
 /// others: scripts go on working.
-pub const OWN: [&str; 1] = ["events"];
+pub const OWN: [&str; 3] = ["clocks", "events", "ring"];
 
 /// What an abbreviation stands for.
 #[derive(Debug)]
@@ -107,7 +109,9 @@ mod tests {
         assert_eq!(names("siir"), ["sii_read", "sii_write"]);
         assert_eq!(names("dw"), ["download"]);
         assert!(names("xyz").is_empty());
-        assert_eq!(names("ev"), ["events"]);
+        assert_eq!([names("ev"), names("cl"), names("ring")].concat(), ["events", "clocks", "ring"]);
+        assert_eq!(names("r"), ["reg_read", "reg_write", "rescan"]);
+        assert_eq!(names("c"), ["config", "crc", "cstruct"]);
         assert!(OWN.iter().all(|own| ALL.iter().any(|command| command.name == *own)));
     }
 }

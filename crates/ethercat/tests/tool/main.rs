@@ -12,6 +12,7 @@ mod hostile;
 mod idle;
 mod operation;
 mod outputs;
+mod ring_and_clocks;
 mod several;
 mod shells;
 mod standalone;

@@ -1,0 +1,79 @@
+//! `ring`: the ring, its links and its cables. Not a command of the original tool.
+
+use ringcat_control::message::{Answer, CableSnapshot, Query, Snapshot};
+
+use crate::failure::{Failure, unexpected};
+use crate::session::Session;
+use crate::shape::Command;
+
+/// The command.
+pub const COMMAND: Command = Command {
+    name: "ring",
+    summary: "Show the ring: slaves on each link, a break, errors of cables.",
+    forms: &[""],
+    help: "Damaged frames and lost links are counted at both ends of each cable
+while an application is active. Not a command of IgH.
+",
+    options: "",
+    run,
+};
+
+/// The names of the links.
+const LINKS: [&str; 2] = ["MAIN", "REDUNDANT"];
+
+fn run(session: &mut Session<'_>) -> Result<(), Failure> {
+    let masters = session.masters()?;
+    for master in &masters {
+        let number = master.master;
+        let (Answer::State(state), _) = session.ask(number, Query::State, Vec::new())? else {
+            return Err(unexpected());
+        };
+        let (Answer::Overview(seen), _) = session.ask(number, Query::Overview, Vec::new())? else {
+            return Err(unexpected());
+        };
+        if masters.len() > 1 {
+            writeln!(session, "Master{number}")?;
+        }
+        session.write(text(&state, seen.counts).as_bytes())?;
+    }
+    Ok(())
+}
+
+fn text(state: &Snapshot, counts: [u16; 2]) -> String {
+    let ring = &state.ring;
+    // A bus on one link knows nothing of a second one.
+    let is_single = ring.links[1].carrier.is_none() && ring.redundant.is_none() && ring.closed != Some(false);
+    let shown = match (ring.closed, ring.redundant) {
+        _ if is_single => "one link",
+        (Some(true), Some(false)) => "closed, frames are lost in one direction",
+        (Some(true), _) => "closed",
+        (Some(false), _) => "OPEN: the next break isolates slaves",
+        (None, _) => "unknown",
+    };
+    let mut text = format!("ring        {shown}\n");
+    for ((name, link), count) in LINKS.iter().zip(&ring.links).zip(counts).take(if is_single { 1 } else { 2 }) {
+        let carrier = if link.carrier == Some(false) { ", no carrier" } else { "" };
+        text += &format!("{name:<11} {count} slaves{carrier}\n");
+    }
+    if let Some(place) = &ring.break_at {
+        text += &format!("line break  {}\n", cable(place));
+    }
+    if !state.cables.is_empty() {
+        text += "damaged frames, lost links at each cable:\n";
+    }
+    for at in &state.cables {
+        let is_broken = ring.break_at.as_ref().is_some_and(|place| (place.near, place.far) == (at.near, at.far));
+        let mark = if is_broken { "  <- line break" } else { "" };
+        text += &format!("{:>6} {:>6}  {}{mark}\n", at.errors[0], at.errors[1], cable(at));
+    }
+    text
+}
+
+/// A cable by its two ends.
+fn cable(cable: &CableSnapshot) -> String {
+    let end = |port: Option<(usize, u8)>, host: &str| match port {
+        Some((position, port)) => format!("slave {position} port {port}"),
+        None => format!("the {host} interface"),
+    };
+    format!("{} - {}", end(cable.near, LINKS[0]), end(cable.far, LINKS[1]))
+}
