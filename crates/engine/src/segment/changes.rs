@@ -1,5 +1,7 @@
-//! Changes of the segment that posted words show, counted for the procedures that wait for one: the words are compared
-//! here only.
+//! Changes of the segment that posted words show, counted for the procedures that wait for one. Rules of the model
+//! compare the words with references of their own: a round with those at its begin (`attention`), the ring with what
+//! was reported (`ring`), idle operation with the last scan (`rules/idle`), silence with the last answer
+//! (`rules/silence`).
 
 use super::clocks::Clocks;
 use super::ring::Words;
