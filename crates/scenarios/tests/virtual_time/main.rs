@@ -99,6 +99,7 @@ mod startup_commands;
 mod state_of_all;
 mod states;
 mod stops;
+mod sync_repeats;
 mod taps;
 mod tool;
 mod topologies;
