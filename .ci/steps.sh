@@ -124,27 +124,16 @@ lints() {
     cargo clippy --release --locked --manifest-path ci/no-std-proof/Cargo.toml -- -D warnings
 }
 
-# The library with each of its features alone: what `--workspace` builds has them all. Two lists at once, since one crate
-# is checked by one processor.
+# The library without features and with `standby` alone, the program without it: what `--workspace` builds has them all.
+# With --full each feature alone, and the program.
 features() {
-    local other status=0
-    (
-        export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-target}/features
+    local feature features=("" standby)
+    if [[ ${#full[@]} != 0 ]]; then
+        features+=(packet sim eni network esi gateway eoe daemon serde tracing)
         echo "the program without standby"
         cargo clippy --package ringcat-cli --no-default-features --all-targets -- -D warnings
-        alone standby serde daemon
-    ) >"$logs/features" 2>&1 &
-    other=$!
-    alone "" packet sim eni network esi gateway eoe tracing
-    wait "$other" || status=$?
-    cat "$logs/features"
-    return "$status"
-}
-
-# alone FEATURE...: the library with one feature at a time.
-alone() {
-    local feature
-    for feature in "$@"; do
+    fi
+    for feature in "${features[@]}"; do
         echo "ringcat with \"$feature\""
         cargo clippy --package ringcat --no-default-features --features "$feature" -- -D warnings
     done
