@@ -1,17 +1,22 @@
-//! `ringcat standby`: the second MainDevice of a ring, INACTIVE.
+//! `ringcat standby`: one of two MainDevices in a ring.
 //!
-//! It forwards the frames of the ACTIVE MainDevice between its interfaces. There is no takeover yet.
+//! It forwards the frames of the ACTIVE MainDevice between its interfaces. With a declaration it follows the ACTIVE, and
+//! takes over ([`takeover`]).
 //!
 //! Its interfaces are up only while it forwards (protocol MR-21): an interface that is up and does not forward takes
 //! the whole bus from the ACTIVE, one that is down leaves it a line.
 
+mod beating;
 pub mod guarding;
+mod joining;
+mod news;
+mod takeover;
 
 use std::time::Duration;
 
 use clap::Args;
 use ringcat::packet::PacketLinks;
-use ringcat::standby::{ForwardingCounters, StoreAndForward};
+use ringcat::standby::{ForwardingCounters, Policy, StoreAndForward};
 use ringcat::{Instant, Link, Links};
 
 use crate::ending::EndRequest;
@@ -19,8 +24,10 @@ use crate::failure::Failure;
 use crate::interfaces::{LinkNames, describe_down};
 use crate::json::data::Data;
 use crate::json::standby::Standby;
+use crate::numbers::number;
 use crate::others::check_sockets;
 use crate::output::{say, warn};
+use crate::run::declared::DeclarationArguments;
 use crate::thread::ThreadArguments;
 use crate::times::time;
 use crate::verdict::{Report, Verdict};
@@ -31,6 +38,8 @@ use guarding::Guarded;
 const SILENT: Duration = Duration::from_secs(1);
 /// An interface without a carrier this long after it was switched on is reported.
 const CARRIER_LIMIT: Duration = Duration::from_secs(5);
+/// From the limit of a guard to the takeover at least: it sees that, and switches two interfaces off.
+const GUARD_ACTS: Duration = Duration::from_millis(2);
 
 /// What it is for, and what it is not.
 const ABOUT_STANDBY: &str = "\
@@ -45,8 +54,14 @@ forward takes the whole bus from the ACTIVE. Switching needs cap_net_admin.
 Another process guards that: it switches both off when this one is killed,
 hangs, or is stopped for longer than --guard.
 
-It never sends on its own, and cannot take over yet: see docs/standby.md, which
-begins with a note on patents.";
+Without a declaration it never sends on its own. With --eni, --network or
+--automatic it is one of two controllers with the same declaration: INACTIVE
+where it hears an ACTIVE, otherwise ACTIVE. As INACTIVE it takes over when it
+has heard no process data for --timeout cycles. At its end an ACTIVE hands the
+role over if the other one is ready; otherwise it stops the bus as `ringcat run`
+does. Exit status 1 if something did not hold, and the last line says what.
+
+See docs/standby.md, which begins with a note on patents.";
 
 /// Options of `ringcat standby`.
 #[derive(Args, Debug)]
@@ -56,11 +71,25 @@ pub struct StandbyArguments {
     links: LinkNames,
     #[command(flatten)]
     thread: ThreadArguments,
+    #[command(flatten)]
+    declared: DeclarationArguments,
+    /// Take over with the SubDevices found as their SIIs say
+    #[arg(long, conflicts_with = "file", group = "declaration", help_heading = "Segment")]
+    automatic: bool,
+    #[command(flatten)]
+    policy: PolicyArguments,
     /// Age from which frames are not forwarded
     ///
     /// Frames wait where this computer is too busy, or where this program was stopped. They would bring SubDevices back
     /// to earlier outputs; the ACTIVE has given them up.
-    #[arg(long, value_name = "TIME", value_parser = time, default_value = "5ms", help_heading = "Run")]
+    #[arg(
+        long,
+        value_name = "TIME",
+        value_parser = time,
+        default_value = "5ms",
+        conflicts_with = "declaration",
+        help_heading = "Run"
+    )]
     max_age: Duration,
     /// Time after which both interfaces are switched off if this program hangs
     ///
@@ -79,8 +108,43 @@ pub struct StandbyArguments {
     force: bool,
 }
 
-/// Forwards, and says what.
+/// When the role changes.
+#[derive(Args, Clone, Copy, Debug)]
+#[command(next_help_heading = "Role")]
+pub struct PolicyArguments {
+    /// Cycles without process data of the ACTIVE after which this one takes over
+    ///
+    /// But not before 15 ms, and not before --guard and 2 ms: the guard of an ACTIVE that hangs has to have acted.
+    #[arg(
+        long,
+        value_name = "CYCLES",
+        default_value = "3",
+        value_parser = number(3_u32..=1000, 10),
+        requires = "declaration"
+    )]
+    timeout: u32,
+    /// How long this one listens before it becomes ACTIVE at its start; a random pause up to this time follows
+    #[arg(long, value_name = "TIME", value_parser = time, default_value = "2s", requires = "declaration")]
+    listen: Duration,
+    /// Stay INACTIVE: neither take over, nor be handed the role over
+    #[arg(long, requires = "declaration")]
+    permanent_standby: bool,
+}
+
+impl PolicyArguments {
+    /// The policy, where both controllers have a guard with this limit.
+    fn policy(self, guard: Duration) -> Policy {
+        let policy = if self.permanent_standby { Policy::permanent_standby() } else { Policy::default() };
+        let least = policy.least_time_out.max(guard + GUARD_ACTS);
+        policy.with_time_out(self.timeout, least).with_listen(self.listen)
+    }
+}
+
+/// Forwards, and says what; takes over with a declaration.
 pub fn run(arguments: &StandbyArguments) -> Result<Report, Failure> {
+    if arguments.automatic || arguments.declared.configured.is_given() {
+        return takeover::run(arguments);
+    }
     let end = EndRequest::watch(arguments.thread.priority)?;
     let names = &arguments.links;
     names.check()?;
