@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use ringcat::{Links, MainDevice, Options, automatic};
-use ringcat_sim::cable::{Direction, HostLink};
+use ringcat_sim::cable::{DeviceIndex, Direction, HostLink};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_sim::time::SimTime;
@@ -112,5 +112,31 @@ fn a_start_continues_soon_after_all_frames_were_lost_for_up_to_90_ms() {
         // The longest limit is 20 ms; all tries of a datagram together wait for 100 ms.
         let limit = lost_ms + 21;
         assert!(most < Duration::from_millis(limit), "{lost_ms} ms: {most:?}");
+    }
+}
+
+/// A segment that is simulated by a process, or is behind a bridge, may stand still: its frames come together then.
+// covers: scan, lost-frames
+#[test]
+fn a_segment_that_stands_still_for_100_ms_makes_no_eeprom_unreadable() {
+    for stopped_us in (93_000..101_000).step_by(1_000) {
+        for at_us in (10_000..60_000_u64).step_by(4_700) {
+            let mut network = drives(1);
+            let slow = Fault::SlowSii { device: DeviceIndex(0), busy: Duration::from_millis(5), times: u32::MAX };
+            network.apply(slow);
+            let cable = network.host_cable(HostLink::Main).expect("there is one");
+            let (direction, end_us) = (Some(Direction::AToB), at_us + stopped_us);
+            for now_us in (at_us..end_us).step_by(100) {
+                let by = Duration::from_micros(end_us - now_us);
+                network.schedule(SimTime(now_us * 1_000), Fault::Delay { cable, direction, count: u32::MAX, by });
+            }
+            let none = Fault::Delay { cable, direction, count: 0, by: Duration::ZERO };
+            network.schedule(SimTime(end_us * 1_000), none);
+            let mut main_device = MainDevice::request(Tap::new(network), &Options::default());
+            // All tries of a datagram together wait for 100 ms.
+            let Ok(found) = main_device.scan() else { continue };
+            let text = format!("{stopped_us} us from {at_us} us on: {:?}", found.subdevices[0].warnings);
+            assert!(!found.subdevices[0].is_blank(), "{text}");
+        }
     }
 }

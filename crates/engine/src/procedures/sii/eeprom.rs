@@ -68,9 +68,11 @@ pub(super) struct Eeprom {
 impl Eeprom {
     /// Waits until the controller has loaded its configuration, and until the last command of another user has ended.
     pub(super) async fn open(bus: &Bus, station: StationAddress, pace: Pace) -> Result<Eeprom, SiiReadError> {
-        let begin = bus.now();
+        let mut begin = None;
         loop {
             let control = SiiControl::decode(&bus.fprd_array(station, map::SII_CONTROL).await?);
+            // From the first reply on: a segment that stands still for a moment loads nothing.
+            let begin = *begin.get_or_insert(bus.now());
             let elapsed = bus.now().since(begin);
             if !control.busy {
                 return Ok(Eeprom {
@@ -211,6 +213,7 @@ impl Eeprom {
     async fn finish(&mut self, given: Given, next: Option<u32>) -> Result<Result<(), Failure>, SiiReadError> {
         self.bus.sleep_until(given.at + self.pace.first()).await;
         let mut early = None;
+        let mut busy: Option<(u32, Instant)> = None;
         loop {
             let poll = self.poll(next).await?;
             let elapsed = poll.at.since(given.at);
@@ -234,7 +237,14 @@ impl Eeprom {
                 // The EEPROM finished between the poll and the command behind it.
                 return Ok(Err(Failure::NotTaken));
             }
-            if elapsed > COMMAND_LIMIT {
+            // From the reply on that has shown it first: where a segment stands still for a moment, frames are answered
+            // long after they left, and the busy command may be the next one.
+            let since = match busy {
+                Some((word, since)) if word == poll.address => since,
+                _ => self.bus.now(),
+            };
+            busy = Some((poll.address, since));
+            if poll.at.since(since) > COMMAND_LIMIT {
                 return Err(SiiReadError::Busy { word: given.word });
             }
             if self.bus.now() >= self.until {
