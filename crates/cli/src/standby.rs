@@ -1,7 +1,7 @@
 //! `ringcat standby`: one of two MainDevices in a ring.
 //!
-//! It forwards the frames of the ACTIVE MainDevice between its interfaces. With a declaration it follows the ACTIVE, and
-//! takes over ([`takeover`]).
+//! It forwards the frames of the ACTIVE MainDevice between its interfaces. With a declaration it follows the ACTIVE,
+//! and takes over ([`takeover`]).
 //!
 //! Its interfaces are up only while it forwards (protocol MR-21): an interface that is up and does not forward takes
 //! the whole bus from the ACTIVE, one that is down leaves it a line.
