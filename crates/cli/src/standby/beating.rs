@@ -6,6 +6,7 @@ use std::task::Waker;
 use std::time::Duration;
 
 use ringcat::links::{Arrived, SendOn};
+use ringcat::packet::PacketLinks;
 use ringcat::standby::RoleControl;
 use ringcat::standby::guard::Pulse;
 use ringcat::wire::frame::MacAddress;
@@ -36,6 +37,9 @@ pub enum Half {
     /// Beats while this MainDevice brings up its bus, and there are no cycles.
     Acyclic,
 }
+
+/// Links of one half.
+pub type HalfLinks = BeatingLinks<PacketLinks>;
 
 /// Links that beat.
 #[derive(Debug)]

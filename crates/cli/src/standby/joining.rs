@@ -1,17 +1,17 @@
 //! From listening to cycles, in a thread of its own, which forwards meanwhile.
 
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::thread::JoinHandle;
 
 use ringcat::standby::Policy;
 use ringcat::text::Names;
-use ringcat::{CyclicThread, Declaration, Scan, SupervisorThread, Trigger, automatic};
+use ringcat::{CyclicThread, Declaration, ProcessData, Scan, SupervisorThread, Trigger, automatic};
 
-use super::beating::Beats;
-use super::takeover::{HalfLinks, work};
+use super::beating::{Beats, HalfLinks};
 use crate::failure::Failure;
-use crate::run::configured::{ConfiguredNetwork, Watched};
+use crate::run::configured::{ConfiguredNetwork, Watched, Work};
 use crate::run::declared::DeclarationArguments;
 use crate::thread::ThreadArguments;
 
@@ -104,5 +104,19 @@ impl Joiner {
                 automatic(&[], self.declared.cycle)
             }
         }
+    }
+}
+
+/// The work of each cycle, in both roles.
+fn work(
+    mut file: Option<Work>,
+    ready: Arc<AtomicBool>,
+) -> impl FnMut(&mut ProcessData<'_>) -> ControlFlow<()> + Send + 'static {
+    move |data| {
+        if let Some(file) = &mut file {
+            file.cycle(data);
+        }
+        ready.store(data.partner().is_ready(), Ordering::Relaxed);
+        ControlFlow::Continue(())
     }
 }

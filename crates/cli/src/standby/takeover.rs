@@ -3,7 +3,6 @@
 //! A thread joins the ring and then runs the cycles; it forwards meanwhile. The main thread says what happens, and ends
 //! both in order.
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{JoinHandle, sleep};
@@ -11,16 +10,15 @@ use std::time::Duration;
 
 use ringcat::packet::PacketLinks;
 use ringcat::standby::{RoleControl, RoleRequest, StandbyOptions};
-use ringcat::{
-    AlState, CyclicThread, Instant, LastOutputs, MainDeviceRole, Options, ProcessData, SubDeviceState, SupervisorThread,
-};
+use ringcat::{AlState, CyclicThread, Instant, LastOutputs, MainDeviceRole, Options, SubDeviceState, SupervisorThread};
 use ringcat_link::interface;
 
-use super::beating::{BeatingLinks, Beats, Half};
+use super::beating::{BeatingLinks, Beats, Half, HalfLinks};
+use super::counters::{in_line, same_identity};
 use super::guarding::Guarded;
 use super::joining::{Joined, Joiner};
 use super::news::News;
-use super::{StandbyArguments, in_line, same_identity};
+use super::options::StandbyArguments;
 use crate::ending::EndRequest;
 use crate::failure::Failure;
 use crate::interfaces::now;
@@ -43,9 +41,6 @@ const LAST_NEWS: Duration = Duration::from_millis(30);
 /// A bus that is being brought up when the end comes is finished first, for this long at most: only then is it known
 /// what to stop.
 const BRING_UP_LIMIT: Duration = Duration::from_secs(20);
-
-/// Links of one half.
-pub type HalfLinks = BeatingLinks<PacketLinks>;
 
 /// The program while it is one of two.
 struct Controller<'a> {
@@ -297,19 +292,5 @@ impl Drop for SwitchedOn {
             // Where it is not permitted, it was not permitted to begin either.
             let _ = interface::switch(name, false);
         }
-    }
-}
-
-/// The work of each cycle, in both roles.
-pub fn work(
-    mut file: Option<crate::run::configured::Work>,
-    ready: Arc<AtomicBool>,
-) -> impl FnMut(&mut ProcessData<'_>) -> ControlFlow<()> + Send + 'static {
-    move |data| {
-        if let Some(file) = &mut file {
-            file.cycle(data);
-        }
-        ready.store(data.partner().is_ready(), Ordering::Relaxed);
-        ControlFlow::Continue(())
     }
 }
