@@ -92,6 +92,7 @@ impl MainDevice {
     pub fn start_deactivate(&mut self, limit: Duration, now: Instant) -> Result<(), ServiceError> {
         self.permit(Function::Deactivate)?;
         let segment = self.active().ok_or(ServiceError::NotActive)?;
+        // What is known of them is noted here.
         self.segment.observe_written_pdos();
         let remainder = Remainder::of(&segment.view());
         self.end_application(now);

@@ -29,10 +29,13 @@ const END_LIMIT: Duration = Duration::from_secs(90);
 /// Both ends sleep until a frame arrives, with priority over other programs: the machine may be busy.
 const THREAD: [&str; 4] = ["--receive", "block", "--priority", "50"];
 
-/// Directory of the programs of this repository; they are built if they are out of date. The whole workspace is built,
-/// so that its features are those of the tests and nothing is built twice.
+/// Directory of the programs of this repository; they are built if they are out of date, unless
+/// RINGCAT_PROGRAMS_ARE_BUILT=1. The whole workspace is built, so that its features are those of the tests.
 static PROGRAMS: LazyLock<PathBuf> = LazyLock::new(|| {
     let profile = target_directory();
+    if std::env::var("RINGCAT_PROGRAMS_ARE_BUILT").is_ok_and(|value| value == "1") {
+        return profile;
+    }
     let mut build = Command::new(env!("CARGO"));
     build.args(["build", "--quiet", "--workspace", "--bin", "ringcat", "--example", "ethercrab_client"]);
     build.arg("--target-dir").arg(profile.parent().expect("a target directory"));

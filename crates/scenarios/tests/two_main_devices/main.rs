@@ -6,6 +6,7 @@ mod clocks;
 mod collisions;
 mod following;
 mod library;
+mod outside_links;
 mod rows;
 mod taking_over;
 mod threads;

@@ -1,5 +1,6 @@
 //! Two MainDevices of the library, each with its halves in two threads, at one ring in real time. What depends on the
-//! load of the machine is not judged: no output goes back, and each state is reached in the end.
+//! load of the machine is not judged: no output goes back, each state is reached in the end, and cycles in both roles
+//! and with both changes of role neither allocate nor free memory.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -14,17 +15,24 @@ use ringcat::{
 use ringcat_sim::cable::{DeviceIndex, Host};
 use ringcat_wire::al::{AlState, AlStatus};
 
+use super::outside_links::{OutsideLinks, used};
 use super::ring_of_two;
 
 const CYCLE: Duration = Duration::from_millis(5);
+/// Cycles in each role, at least.
+const COUNTED: u64 = 100;
 /// A machine that is busy reaches a state within this time.
 const LIMIT: Duration = Duration::from_secs(20);
 
 /// The outputs of the next cycle: both controllers count on, so values compare.
 static NEXT: AtomicU64 = AtomicU64::new(1);
+/// Cycles of both as ACTIVE and as INACTIVE, and what they have allocated and freed.
+static CYCLES: [AtomicU64; 2] = [const { AtomicU64::new(0) }; 2];
+static USED: AtomicU64 = AtomicU64::new(0);
 
 type Halves = (SharedSegment, SharedSegment);
-type Member = CyclicThread<SharedSegment>;
+type Cyclic = OutsideLinks<SharedSegment>;
+type Member = CyclicThread<Cyclic>;
 
 /// Joins with both threads, and runs cycles.
 fn join((cyclic, acyclic): Halves) -> Member {
@@ -32,19 +40,26 @@ fn join((cyclic, acyclic): Halves) -> Member {
     let supervisor = SupervisorThread::start(acyclic, &options, || ()).expect("a thread starts");
     let policy = Policy::default().with_time_out(6, Duration::ZERO).with_listen(Duration::from_millis(300));
     let declare = |scan: &Scan| automatic(&scan.subdevices, CYCLE);
+    let cyclic = OutsideLinks(cyclic);
     let application = supervisor.join(&policy, declare, cyclic).unwrap_or_else(|refused| panic!("{}", refused.error));
     run(application)
 }
 
-fn run(application: Application<SharedSegment, SupervisorThread>) -> Member {
+fn run(application: Application<Cyclic, SupervisorThread>) -> Member {
     let count = application.states().len();
     let areas = (0..count).flat_map(|subdevice| application.directory().areas(SubDeviceId(subdevice)).to_vec());
     let outputs: Vec<_> = areas
         .filter(|area| area.direction == Direction::Outputs && area.placed.area.length >= 2)
         .map(|area| area.placed.image_offset as usize..area.placed.image_offset as usize + 2)
         .collect();
+    let mut used_before = None;
     let work = move |data: &mut ringcat::ProcessData<'_>| {
-        if data.role() == MainDeviceRole::Active {
+        let is_active = data.role() == MainDeviceRole::Active;
+        // From one cycle to the next.
+        let used = used();
+        USED.fetch_add(used - used_before.replace(used).unwrap_or(used), Ordering::Relaxed);
+        CYCLES[usize::from(is_active)].fetch_add(1, Ordering::Relaxed);
+        if is_active {
             let number = (NEXT.fetch_add(1, Ordering::Relaxed) as u16).to_le_bytes();
             for area in outputs.iter().cloned() {
                 data.outputs_mut(DomainId(0), area).expect("they are outputs").copy_from_slice(&number);
@@ -101,7 +116,7 @@ fn standby_events(member: &Member) -> Vec<StandbyEvent> {
     events
 }
 
-// covers: standby, threads, MR-01, MR-07, REQ015
+// covers: standby, threads, no-allocation, MR-01, MR-07, REQ015
 #[test]
 fn two_with_cycles_in_threads_join_hand_over_and_take_over() {
     let [first, second] = SharedSegment::halves_of_two(ring_of_two(4, Host::First));
@@ -136,6 +151,8 @@ fn two_with_cycles_in_threads_join_hand_over_and_take_over() {
             .iter()
             .any(|event| matches!(event, StandbyEvent::Partner(partner) if partner.is_ready()))
     });
+    let counted = || [&CYCLES[0], &CYCLES[1]].map(|cycles| cycles.load(Ordering::Relaxed));
+    until(&plant, &mut last, "cycles in both roles", || counted().into_iter().all(|cycles| cycles >= COUNTED));
     drop(second);
     switch(&plant, Host::Second, false);
     until(&plant, &mut last, "the first one is ACTIVE again", || role(&first) == MainDeviceRole::Active);
@@ -144,4 +161,8 @@ fn two_with_cycles_in_threads_join_hand_over_and_take_over() {
     until(&plant, &mut last, "outputs go on, all are in OP", || outputs() != before && all_in_op(&plant));
     assert!(last.iter().any(|number| *number > 5), "outputs were checked: {last:?}");
     drop(first.end());
+    let [inactive, active] = counted();
+    let used = USED.load(Ordering::Relaxed);
+    println!("{active} cycles as ACTIVE, {inactive} as INACTIVE: {used} allocations and deallocations");
+    assert_eq!(used, 0, "in {active} and {inactive} cycles");
 }
