@@ -132,9 +132,9 @@ enum Command {
     ///
     /// It never sends: a MainDevice on these interfaces does not notice.
     Capture(capture::CaptureArguments),
-    /// Forwards the frames of the ACTIVE MainDevice, as the INACTIVE one of a ring
+    /// Is one of two MainDevices in a ring: forwards as INACTIVE, and takes over
     ///
-    /// The second MainDevice of MainDevice redundancy; it cannot take over yet.
+    /// It takes over with a declaration; without one it only forwards the frames of the ACTIVE.
     #[cfg(feature = "standby")]
     Standby(standby::StandbyArguments),
     /// Guards the interfaces of `ringcat standby`, which starts it

@@ -5,7 +5,8 @@
 //! cycles are due to this machine, lost frames to the wire.
 
 mod beside;
-mod configured;
+pub mod configured;
+pub mod declared;
 mod exchange;
 mod jobs;
 mod junction;
@@ -23,8 +24,7 @@ use ringcat::event_log::EventLog;
 use ringcat::text::{Names, address_of_sender, describe};
 use ringcat::{
     Application, CyclicThread, Declaration, Ended, Event, Instant, JobProbe, JunctionConnection, JunctionMode,
-    LastOutputs, Links, Options, ProcessData, ReadPdos, Scan, SubDeviceId, SubDeviceInfo, SupervisorThread,
-    SyncSignals, automatic,
+    LastOutputs, Links, Options, ProcessData, Scan, SubDeviceId, SupervisorThread, SyncSignals,
 };
 
 use crate::access::{Access, WireLinks};
@@ -71,12 +71,13 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
         Some(network) => network.names(),
         None => Names(scan.subdevices.iter().map(|info| info.name.clone()).collect()),
     };
-    let declaration = declare(arguments, network.as_ref(), &scan.subdevices)?;
+    let declaration = arguments.declared.declare(network.as_ref(), &scan.subdevices)?;
+    let declaration = arguments.resend.adapt(declaration.with_under_way(arguments.under_way.under_way));
     let undeclared = network.as_ref().map_or(0, |network| {
         network.report_cables(&scan);
         network.undeclared(&scan.subdevices)
     });
-    let period = declaration.domains.iter().map(|domain| domain.period).min().unwrap_or(arguments.cycle);
+    let period = declaration.domains.iter().map(|domain| domain.period).min().unwrap_or(arguments.declared.cycle);
     let (domains, clocks) = (declaration.domains.len(), declaration.clocks.is_some());
     let signals: Vec<Option<SyncSignals>> = declaration.subdevices.iter().map(|config| config.sync).collect();
     say!("{} SubDevices; cycle {} us", scan.subdevices.len(), period.as_micros());
@@ -121,7 +122,7 @@ fn begin(arguments: &RunArguments) -> Result<(Access, Option<ConfiguredNetwork>)
         None => Some(arguments.access.interfaces.links.redundant.is_some()),
     };
     // A wrong file shows before anything is opened.
-    let network = arguments.configured.load(ring)?;
+    let network = arguments.declared.configured.load(ring)?;
     let access = arguments.access.begin(&options(arguments, network.as_ref()))?;
     if let Some(network) = &network {
         network.check_links(access.interfaces.links.redundant.is_some())?;
@@ -130,14 +131,12 @@ fn begin(arguments: &RunArguments) -> Result<(Access, Option<ConfiguredNetwork>)
 }
 
 fn options(arguments: &RunArguments, network: Option<&ConfiguredNetwork>) -> Options {
-    // A file that declares all SyncManagers says what PDOs there are.
-    let pdos = if network.is_some_and(ConfiguredNetwork::is_complete) { ReadPdos::Never } else { ReadPdos::default() };
     let options = arguments.access.interfaces.options();
     let junctions = junctions(arguments, network);
     options
         .with_junctions(junctions.map_or(arguments.junction.mode, |(mode, _)| mode))
         .with_enhanced_line_crossed(arguments.enhanced_line_crossed)
-        .with_pdos(pdos)
+        .with_pdos(declared::pdos(network))
 }
 
 /// How rings behind junctions are handled where the file says it and the command line does not.
@@ -171,7 +170,7 @@ fn activate(
     declaration: Declaration,
     cyclic: WireLinks,
 ) -> Result<Recorded, Failure> {
-    let trigger = declaration.clocks.as_ref().map(|clocks| arguments.clock_options.trigger(clocks.bus_shift));
+    let trigger = arguments.declared.trigger(&declaration);
     supervisor.load(declaration)?;
     let at_station = |station| network.and_then(|network| network.at_station(station));
     for connection in &arguments.junction.connections {
@@ -271,31 +270,6 @@ fn finish(run: Run, end: &mut End, jobs: &Jobs, links: &LinkNames, reasons: &mut
     }
     reasons.extend(run.recording.finish());
     Data::Run(Box::new(json))
-}
-
-/// The declaration: the network of the file, or the SubDevices found as their SIIs say.
-fn declare(
-    arguments: &RunArguments,
-    network: Option<&ConfiguredNetwork>,
-    found: &[SubDeviceInfo],
-) -> Result<Declaration, Failure> {
-    let options = &arguments.clock_options;
-    let asked = arguments.clocks || options.are_given();
-    let declaration = match network {
-        Some(network) => {
-            let mut declaration = network.declaration(found)?;
-            options.adapt(&mut declaration, asked)?;
-            declaration
-        }
-        None => {
-            let mut declaration = automatic(found, arguments.cycle);
-            if asked {
-                options.declare(&mut declaration, found)?;
-            }
-            declaration
-        }
-    };
-    Ok(arguments.resend.adapt(declaration.with_under_way(arguments.under_way.under_way)))
 }
 
 /// Reports other MainDevices and oddities of the cabling among the events of a scan.

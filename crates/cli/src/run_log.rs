@@ -80,8 +80,16 @@ impl RunLog {
     }
 }
 
-/// The variant of an event.
+/// The variant of an event; of one about the other MainDevice that of [`Event::Standby`].
 pub fn name_of(event: &Event) -> String {
+    #[cfg(feature = "standby")]
+    if let Event::Standby(event) = event {
+        return variant(event);
+    }
+    variant(event)
+}
+
+fn variant(event: &impl std::fmt::Debug) -> String {
     let text = format!("{event:?}");
     text.chars().take_while(char::is_ascii_alphanumeric).collect()
 }

@@ -1,86 +1,47 @@
-//! `ringcat standby`: the second MainDevice of a ring, INACTIVE.
+//! `ringcat standby`: one of two MainDevices in a ring.
 //!
-//! It forwards the frames of the ACTIVE MainDevice between its interfaces. There is no takeover yet.
+//! It forwards the frames of the ACTIVE MainDevice between its interfaces. With a declaration it follows the ACTIVE,
+//! and takes over ([`takeover`]).
 //!
 //! Its interfaces are up only while it forwards (protocol MR-21): an interface that is up and does not forward takes
 //! the whole bus from the ACTIVE, one that is down leaves it a line.
 
+mod beating;
+mod counters;
 pub mod guarding;
+mod joining;
+mod news;
+mod options;
+mod takeover;
 
 use std::time::Duration;
 
-use clap::Args;
 use ringcat::packet::PacketLinks;
-use ringcat::standby::{ForwardingCounters, StoreAndForward};
+use ringcat::standby::StoreAndForward;
 use ringcat::{Instant, Link, Links};
 
 use crate::ending::EndRequest;
 use crate::failure::Failure;
-use crate::interfaces::{LinkNames, describe_down};
+use crate::interfaces::describe_down;
 use crate::json::data::Data;
 use crate::json::standby::Standby;
 use crate::others::check_sockets;
 use crate::output::{say, warn};
-use crate::thread::ThreadArguments;
-use crate::times::time;
 use crate::verdict::{Report, Verdict};
 
+use counters::{in_line, same_identity};
 use guarding::Guarded;
+pub use options::StandbyArguments;
 
 /// No frame for this time: the ACTIVE MainDevice counts as silent.
 const SILENT: Duration = Duration::from_secs(1);
 /// An interface without a carrier this long after it was switched on is reported.
 const CARRIER_LIMIT: Duration = Duration::from_secs(5);
-
-/// What it is for, and what it is not.
-const ABOUT_STANDBY: &str = "\
-The ring leads through both MainDevices: from the main link of the ACTIVE
-through the SubDevices into --redundant here, and from --main here to the
-redundant link of the ACTIVE. Each frame is sent on at the other interface, or
-back if that one is down.
-
-Both interfaces are switched on when it forwards, and off at its end: then the
-ACTIVE has a line. Leave them off before: an interface that is up and does not
-forward takes the whole bus from the ACTIVE. Switching needs cap_net_admin.
-Another process guards that: it switches both off when this one is killed,
-hangs, or is stopped for longer than --guard.
-
-It never sends on its own, and cannot take over yet: see docs/standby.md, which
-begins with a note on patents.";
-
-/// Options of `ringcat standby`.
-#[derive(Args, Debug)]
-#[command(after_long_help = ABOUT_STANDBY)]
-pub struct StandbyArguments {
-    #[command(flatten)]
-    links: LinkNames,
-    #[command(flatten)]
-    thread: ThreadArguments,
-    /// Age from which frames are not forwarded
-    ///
-    /// Frames wait where this computer is too busy, or where this program was stopped. They would bring SubDevices back
-    /// to earlier outputs; the ACTIVE has given them up.
-    #[arg(long, value_name = "TIME", value_parser = time, default_value = "5ms", help_heading = "Run")]
-    max_age: Duration,
-    /// Time after which both interfaces are switched off if this program hangs
-    ///
-    /// Another process does that, and at once when this program is killed. The ACTIVE then has a line instead of no
-    /// bus. A time below the pauses that this computer makes switches them off without need: this program then ends.
-    #[arg(long, value_name = "TIME", value_parser = guarding::limit, default_value = "20ms", help_heading = "Run")]
-    guard: Duration,
-    /// Without such a process
-    #[arg(long, conflicts_with = "guard", help_heading = "Run")]
-    no_guard: bool,
-    /// How long, such as 10s or 5min; until Ctrl-C by default
-    #[arg(long = "for", value_name = "TIME", value_parser = time, help_heading = "Run")]
-    lasts: Option<Duration>,
-    /// Go on although another program on this host uses an interface
-    #[arg(long, help_heading = "Run")]
-    force: bool,
-}
-
-/// Forwards, and says what.
+/// Forwards, and says what; takes over with a declaration.
 pub fn run(arguments: &StandbyArguments) -> Result<Report, Failure> {
+    if arguments.automatic || arguments.declared.configured.is_given() {
+        return takeover::run(arguments);
+    }
     let end = EndRequest::watch(arguments.thread.priority)?;
     let names = &arguments.links;
     names.check()?;
@@ -126,13 +87,6 @@ pub fn run(arguments: &StandbyArguments) -> Result<Report, Failure> {
     Ok(Report { verdict, data: Data::Standby(Standby::from(&counters)) })
 }
 
-/// Why this MainDevice and the ACTIVE cannot be two of one ring.
-fn same_identity(counters: &ForwardingCounters) -> Option<String> {
-    let reason = "the ACTIVE has the same bytes 3 to 5 in its address as an interface here, so neither can tell its \
-                  frames from those of the other: give that interface another address (ip link set IF address ...)";
-    (counters.same_identity > 0).then(|| reason.to_owned())
-}
-
 /// Links that are up as long as this lives, also if the program panics.
 struct LinksUp(PacketLinks);
 
@@ -157,16 +111,6 @@ impl Drop for LinksUp {
         // Where it is not permitted, it was not permitted to begin either.
         let _ = self.0.switch(false);
     }
-}
-
-/// The counters in a line.
-fn in_line(counters: &ForwardingCounters) -> String {
-    let ForwardingCounters { on_main, on_redundant, sent_back, again, own, not_ethercat, too_old, no_link, .. } =
-        counters;
-    format!(
-        "forwarded {on_main} on MAIN, {on_redundant} on RED, of these {sent_back} back; not forwarded: {again} again, \
-         {own} own, {not_ethercat} not EtherCAT, {too_old} too old, {no_link} without a link"
-    )
 }
 
 /// Whether frames of the ACTIVE come.

@@ -109,6 +109,22 @@ impl PacketLinks {
         ))
     }
 
+    /// As [`PacketLinks::open_halves`], for one of two MainDevices; carriers as [`PacketLinks::open_forwarding`].
+    ///
+    /// # Errors
+    /// As [`PacketLinks::open`].
+    pub fn open_forwarding_halves(
+        main: &str,
+        redundant: &str,
+        cyclic: ReceiveMode,
+    ) -> Result<(PacketLinks, PacketLinks), LinkError> {
+        let acyclic = PacketLinks::open_class(main, Some(redundant), ReceiveMode::Blocking, ClassFilter::Acyclic)?;
+        Ok((
+            PacketLinks::open_class(main, Some(redundant), cyclic, ClassFilter::Cyclic)?,
+            acyclic.watch_carriers(main, Some(redundant), FORWARDING_CARRIER_PERIOD)?.with_wake_up()?,
+        ))
+    }
+
     fn open_class(
         main: &str,
         redundant: Option<&str>,

@@ -84,7 +84,8 @@ pub struct EventLine<'a> {
     pub head: Head,
     /// Time since the command began to use the segment, in nanoseconds
     pub time_ns: u64,
-    /// Name of the variant of `ringcat::Event`; null for what is no event of the MainDevice
+    /// Name of the variant of `ringcat::Event`, in place of `Standby` that of `StandbyEvent`; null for what is no event
+    /// of the MainDevice
     pub event: Option<String>,
     /// The event in words, for people: they may change without a new version
     pub text: &'a str,

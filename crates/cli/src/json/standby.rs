@@ -3,8 +3,8 @@
 use ringcat::standby::ForwardingCounters;
 use serde::Serialize;
 
-/// Frames that an INACTIVE MainDevice has received.
-#[derive(Clone, Debug, Serialize)]
+/// Frames that were received as INACTIVE; with a declaration those with process data, since there is an application.
+#[derive(Clone, Debug, Default, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Standby {
     /// Sent on at the main link
@@ -25,6 +25,34 @@ pub struct Standby {
     pub outdated_frames: u64,
     /// Not sent: no link was up
     pub no_link_frames: u64,
+    /// Roles; null without a declaration
+    pub takeover: Option<Takeover>,
+}
+
+/// Roles of a MainDevice of two.
+#[derive(Clone, Debug, Default, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Takeover {
+    /// `active` or `inactive`, before the end
+    pub role: &'static str,
+    /// An application ran: an ACTIVE was followed, or none was there
+    pub has_joined: bool,
+    /// Changes of the role, with that from INACTIVE at the beginning
+    pub role_changes: u64,
+    /// Of these, takeovers of a running bus
+    pub takeovers: u64,
+    /// Of these, takeovers after which all SubDevices were configured again from INIT on
+    pub warm_takeovers: u64,
+    /// Frames of another ACTIVE that were reported
+    pub collisions: u64,
+    /// Differences of the configuration that were reported
+    pub configuration_differences: u64,
+    /// The other MainDevice was ready to take over at the end
+    pub partner_ready: bool,
+    /// The role was handed over at the end
+    pub handed_over: bool,
+    /// The bus was stopped at the end: outputs zero, all SubDevices in INIT
+    pub stopped: bool,
 }
 
 impl From<&ForwardingCounters> for Standby {
@@ -39,6 +67,7 @@ impl From<&ForwardingCounters> for Standby {
             other_frames: counters.not_ethercat,
             outdated_frames: counters.too_old,
             no_link_frames: counters.no_link,
+            takeover: None,
         }
     }
 }

@@ -27,19 +27,24 @@ const NEAR: usize = 3;
 const LIKE: f64 = 0.6;
 
 /// Options about the file of a network.
-#[derive(Args, Debug, Default)]
+#[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Segment")]
 pub struct ConfiguredArguments {
     /// Bring the network of this ENI to OP, instead of the SubDevices found
     ///
     /// TwinCAT, EC-Engineer and other tools export an ENI. `ringcat eni FILE` shows what of it is followed; see
     /// docs/eni.md.
-    #[arg(long, value_name = "FILE", conflicts_with = "cycle", group = "file")]
+    #[arg(long, value_name = "FILE", conflicts_with = "cycle", groups = ["file", "declaration"])]
     eni: Option<PathBuf>,
     /// Bring the network of this network file to OP, instead of the SubDevices found
     ///
     /// `ringcat init` writes one from a scan; see docs/network-file.md.
-    #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["cycle", "eni"], group = "file")]
+    #[arg(
+        long,
+        value_name = "FILE.toml",
+        conflicts_with_all = ["cycle", "eni"],
+        groups = ["file", "declaration"]
+    )]
     network: Option<PathBuf>,
     /// Send LRD and LWR where the file has an LRW over several SubDevices
     ///
@@ -76,6 +81,12 @@ enum FileOfNetwork {
 }
 
 impl ConfiguredArguments {
+    /// Whether there is a file.
+    #[cfg(feature = "standby")]
+    pub fn is_given(&self) -> bool {
+        self.eni.is_some() || self.network.is_some()
+    }
+
     /// Reads the file, if there is one, and prints what of it is not followed. Refuses a ring on one interface, where
     /// the interfaces are known.
     pub fn load(&self, has_redundant: Option<bool>) -> Result<Option<ConfiguredNetwork>, Failure> {

@@ -5,12 +5,11 @@ use std::time::Duration;
 use clap::Args;
 
 use super::beside::BesideArguments;
-use super::configured::ConfiguredArguments;
+use super::declared::DeclarationArguments;
 use super::junction::{self, Junctions, junctions};
 use crate::access::AccessArguments;
-use crate::clock_options::ClockOptions;
 use crate::resend::ResendArgument;
-use crate::times::{cycle, time};
+use crate::times::time;
 use crate::under_way::UnderWayArgument;
 
 /// How to read what it prints.
@@ -46,9 +45,8 @@ The summary distinguishes three things:
 pub struct RunArguments {
     #[command(flatten)]
     pub access: AccessArguments,
-    /// Cycle time, with its unit: 250us, 1ms; 10us to 1s
-    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = cycle, help_heading = "Cycle")]
-    pub cycle: Duration,
+    #[command(flatten)]
+    pub declared: DeclarationArguments,
     #[command(flatten)]
     pub under_way: UnderWayArgument,
     #[command(flatten)]
@@ -61,8 +59,6 @@ pub struct RunArguments {
     /// When it has passed, everything is stopped and the command fails.
     #[arg(long, value_name = "TIME", default_value = "60s", value_parser = time, help_heading = "Cycle")]
     pub within: Duration,
-    #[command(flatten)]
-    pub configured: ConfiguredArguments,
     #[arg(
         long,
         value_name = "MODE",
@@ -78,11 +74,6 @@ pub struct RunArguments {
     /// Briefly, whenever cables have changed. Needs the permission to configure interfaces (CAP_NET_ADMIN).
     #[arg(long, help_heading = "Segment")]
     pub enhanced_line_crossed: bool,
-    /// Use the distributed clocks
-    #[arg(long, help_heading = "Clocks")]
-    pub clocks: bool,
-    #[command(flatten)]
-    pub clock_options: ClockOptions,
     #[command(flatten)]
     pub beside: BesideArguments,
     /// Take the time of each job of a cycle: receive, process, work, queue, send

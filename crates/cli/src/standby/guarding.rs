@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use clap::Args;
 use ringcat::Instant;
-use ringcat::standby::guard::{self, Ending, Guard};
+use ringcat::standby::guard::{self, Ending, Guard, Pulse};
 use ringcat_link::{HeldSignals, realtime};
 
 use crate::failure::Failure;
@@ -77,6 +77,11 @@ impl Guarded {
     /// Not guarded.
     pub fn unguarded() -> Guarded {
         warn("without a guard: if this program is killed or hangs, the ACTIVE has no bus");
+        Guarded::none()
+    }
+
+    /// The same without a warning.
+    pub fn none() -> Guarded {
         Guarded { guard: None, limit: Duration::MAX, look_at: Instant::default(), fault: None }
     }
 
@@ -96,12 +101,28 @@ impl Guarded {
         self.guard.as_ref().map_or(LOOK, Guard::beat_period).min(LOOK)
     }
 
+    /// Beats of another thread.
+    pub fn pulse(&self) -> Option<Pulse> {
+        self.guard.as_ref().map(Guard::pulse)
+    }
+
+    /// Whether the guard has switched the interfaces off, as another thread has seen.
+    pub fn note_acted(&mut self, has_acted: bool) {
+        if has_acted && self.fault.is_none() {
+            self.fault = Some(self.acted());
+        }
+    }
+
+    fn acted(&self) -> String {
+        let limit = in_words(self.limit);
+        format!("the guard has switched both off: this program did not run for {limit}")
+    }
+
     /// This process runs; false if the guard has switched the interfaces off.
     pub fn beat(&mut self) -> bool {
         let goes_on = self.guard.as_ref().is_none_or(Guard::beat);
         if !goes_on {
-            let limit = in_words(self.limit);
-            self.fault = Some(format!("the guard has switched both off: this program did not run for {limit}"));
+            self.fault = Some(self.acted());
         }
         goes_on
     }

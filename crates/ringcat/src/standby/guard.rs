@@ -18,6 +18,7 @@ use std::os::fd::{AsFd, AsRawFd, OwnedFd};
 use std::os::unix::net::UnixStream;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use ringcat_link::descriptors;
@@ -88,8 +89,20 @@ impl From<io::Error> for GuardError {
 pub struct Guard {
     child: Child,
     stream: UnixStream,
-    heartbeat: Heartbeat,
+    heartbeat: Arc<Heartbeat>,
     limit: Duration,
+}
+
+/// Beats for a [`Guard`], from any thread.
+#[derive(Clone, Debug)]
+pub struct Pulse(Arc<Heartbeat>);
+
+impl Pulse {
+    /// As [`Guard::beat`].
+    #[inline]
+    pub fn beat(&self) -> bool {
+        self.0.beat()
+    }
 }
 
 impl Guard {
@@ -102,7 +115,7 @@ impl Guard {
     pub fn start(mut command: Command, interfaces: &[&str], limit: Duration) -> Result<Guard, GuardError> {
         let (stream, far) = UnixStream::pair()?;
         stream.set_read_timeout(Some(START))?;
-        let heartbeat = Heartbeat::new()?;
+        let heartbeat = Arc::new(Heartbeat::new()?);
         // Ctrl-C is for this process, whose end the guard awaits.
         command.stdin(Stdio::from(OwnedFd::from(far))).stdout(Stdio::null()).process_group(0);
         let child = command.spawn()?;
@@ -136,6 +149,11 @@ impl Guard {
     #[inline]
     pub fn beat(&self) -> bool {
         self.heartbeat.beat()
+    }
+
+    /// Beats from other threads; one of them is enough.
+    pub fn pulse(&self) -> Pulse {
+        Pulse(self.heartbeat.clone())
     }
 
     /// The program beats at least once in this time.

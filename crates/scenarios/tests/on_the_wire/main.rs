@@ -26,6 +26,7 @@ mod mail_captures;
 mod messages;
 mod running;
 mod said;
+mod takeover;
 
 use std::process::Output;
 

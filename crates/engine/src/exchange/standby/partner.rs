@@ -100,13 +100,14 @@ impl Items {
         self.at(self.next)
     }
 
-    /// Compares the configuration of the other MainDevice. Returns a difference once.
+    /// Compares the configuration of the other MainDevice. Returns a difference once. One without items has not loaded
+    /// its configuration yet.
     pub fn compare(&mut self, identity: u64, item: Item) -> Option<Difference> {
         if identity == self.identity {
             self.reported = None;
             return None;
         }
-        if self.reported.is_some() {
+        if self.reported.is_some() || item.count == 0 {
             return None;
         }
         let here = self.digests.len() as u16;
@@ -163,6 +164,7 @@ mod tests {
         let mut items = Items::new(7, [1, 2, 3].into());
         let item = |number, digest| Item { number, count: 3, digest };
         assert_eq!(items.compare(7, item(1, 9)), None, "the configuration as a whole is the same");
+        assert_eq!(items.compare(0, Item { number: 0, count: 0, digest: 0 }), None, "it has none yet");
         assert_eq!(items.compare(8, item(0, 1)), None);
         assert_eq!(items.compare(8, item(1, 9)), Some(Difference::Item(1)));
         assert_eq!(items.compare(8, item(1, 9)), None);

@@ -1,0 +1,58 @@
+//! What is declared: the network of a file, or the SubDevices found as their SIIs say.
+
+use std::time::Duration;
+
+use clap::Args;
+use ringcat::{Declaration, ReadPdos, SubDeviceInfo, Trigger, automatic};
+
+use super::configured::{ConfiguredArguments, ConfiguredNetwork};
+use crate::clock_options::ClockOptions;
+use crate::failure::Failure;
+use crate::times::cycle;
+
+/// Options of a declaration.
+#[derive(Args, Clone, Debug, Default)]
+pub struct DeclarationArguments {
+    /// Cycle time, with its unit: 250us, 1ms; 10us to 1s
+    #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = cycle, help_heading = "Cycle")]
+    pub cycle: Duration,
+    #[command(flatten)]
+    pub configured: ConfiguredArguments,
+    /// Use the distributed clocks
+    #[arg(long, help_heading = "Clocks")]
+    pub clocks: bool,
+    #[command(flatten)]
+    pub clock_options: ClockOptions,
+}
+
+impl DeclarationArguments {
+    /// The declaration: the network of the file, or the SubDevices found as their SIIs say.
+    pub fn declare(
+        &self,
+        network: Option<&ConfiguredNetwork>,
+        found: &[SubDeviceInfo],
+    ) -> Result<Declaration, Failure> {
+        let options = &self.clock_options;
+        let asked = self.clocks || options.are_given();
+        let Some(network) = network else {
+            let mut declaration = automatic(found, self.cycle);
+            if asked {
+                options.declare(&mut declaration, found)?;
+            }
+            return Ok(declaration);
+        };
+        let mut declaration = network.declaration(found)?;
+        options.adapt(&mut declaration, asked)?;
+        Ok(declaration)
+    }
+
+    /// What makes cycles begin, where there are clocks.
+    pub fn trigger(&self, declaration: &Declaration) -> Option<Trigger> {
+        declaration.clocks.as_ref().map(|clocks| self.clock_options.trigger(clocks.bus_shift))
+    }
+}
+
+/// When PDOs are read. A file that declares all SyncManagers says what PDOs there are.
+pub fn pdos(network: Option<&ConfiguredNetwork>) -> ReadPdos {
+    if network.is_some_and(ConfiguredNetwork::is_complete) { ReadPdos::Never } else { ReadPdos::default() }
+}

@@ -1,0 +1,147 @@
+//! Links of a thread whose waits beat for the guard.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
+use std::task::Waker;
+use std::time::Duration;
+
+use ringcat::links::{Arrived, SendOn};
+use ringcat::packet::PacketLinks;
+use ringcat::standby::RoleControl;
+use ringcat::standby::guard::Pulse;
+use ringcat::wire::frame::MacAddress;
+use ringcat::{Instant, Link, Links, MainDeviceRole, PerLink};
+
+/// What threads that beat share.
+#[derive(Debug, Default)]
+pub struct Beats {
+    /// The cycles run: only they beat.
+    pub cycles_run: AtomicBool,
+    /// The role: as ACTIVE without cycles, this MainDevice brings up its bus, and its cyclic half has nothing to do.
+    pub role: OnceLock<RoleControl>,
+    /// The guard has acted.
+    pub has_acted: AtomicBool,
+}
+
+impl Beats {
+    fn brings_up(&self) -> bool {
+        let is_active = self.role.get().is_some_and(|control| control.role() == MainDeviceRole::Active);
+        is_active && !self.cycles_run.load(Ordering::Relaxed)
+    }
+}
+
+/// Half of a MainDevice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Half {
+    Cyclic,
+    /// Beats while this MainDevice brings up its bus, and there are no cycles.
+    Acyclic,
+}
+
+/// Links of one half.
+pub type HalfLinks = BeatingLinks<PacketLinks>;
+
+/// Links that beat.
+#[derive(Debug)]
+pub struct BeatingLinks<L> {
+    links: L,
+    half: Half,
+    pulse: Option<Pulse>,
+    /// Longest wait.
+    period: Duration,
+    beats: Arc<Beats>,
+}
+
+impl<L: Links> BeatingLinks<L> {
+    /// Links of a half, which beats at least once a period.
+    pub fn new(links: L, half: Half, pulse: Option<Pulse>, period: Duration, beats: Arc<Beats>) -> BeatingLinks<L> {
+        BeatingLinks { links, half, pulse, period, beats }
+    }
+
+    /// Beats, if that is due to this half; the end of a wait that shall end at `until`.
+    fn beat(&self, now: Instant, until: Instant) -> Instant {
+        let Some(pulse) = &self.pulse else { return until };
+        let is_due = match self.half {
+            Half::Cyclic => true,
+            Half::Acyclic => self.beats.brings_up(),
+        };
+        if is_due && !pulse.beat() {
+            self.beats.has_acted.store(true, Ordering::Relaxed);
+        }
+        if self.half == Half::Acyclic && self.beats.cycles_run.load(Ordering::Relaxed) {
+            return until;
+        }
+        until.min(now + self.period)
+    }
+}
+
+impl<L: Links> Links for BeatingLinks<L> {
+    fn now(&self) -> Instant {
+        self.links.now()
+    }
+
+    fn addresses(&self) -> PerLink<MacAddress> {
+        self.links.addresses()
+    }
+
+    fn send(&mut self, link: Link, frame: &[u8]) {
+        self.links.send(link, frame);
+    }
+
+    fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool {
+        self.links.receive(take)
+    }
+
+    fn receive_and_pass(&mut self, since: Instant, pass: &mut dyn FnMut(Arrived<'_>, &mut dyn SendOn)) -> bool {
+        self.links.receive_and_pass(since, pass)
+    }
+
+    fn has_frame(&self) -> bool {
+        self.links.has_frame()
+    }
+
+    fn knows_arrivals(&self) -> bool {
+        self.links.knows_arrivals()
+    }
+
+    fn received_at(&mut self, sent_at: Instant, now: Instant) -> Option<Instant> {
+        self.links.received_at(sent_at, now)
+    }
+
+    fn carrier(&self, link: Link) -> Option<bool> {
+        self.links.carrier(link)
+    }
+
+    fn waker(&self) -> Option<Waker> {
+        self.links.waker()
+    }
+
+    fn take_call(&mut self) -> bool {
+        self.links.take_call()
+    }
+
+    fn wait(&mut self, until: Instant) {
+        let until = self.beat(self.links.now(), until);
+        self.links.wait(until);
+    }
+
+    fn wait_from(&mut self, now: Instant, until: Instant) {
+        let until = self.beat(now, until);
+        self.links.wait_from(now, until);
+    }
+
+    fn sleep(&mut self, until: Instant) {
+        loop {
+            let now = self.links.now();
+            let slice = self.beat(now, until);
+            self.links.sleep(slice);
+            if slice >= until {
+                return;
+            }
+        }
+    }
+
+    fn force_disconnect(&mut self, link: Link, disconnect: bool) -> bool {
+        self.links.force_disconnect(link, disconnect)
+    }
+}

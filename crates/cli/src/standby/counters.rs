@@ -1,0 +1,20 @@
+//! Counters of frames that were forwarded, in words.
+
+use ringcat::standby::ForwardingCounters;
+
+/// Why this MainDevice and the ACTIVE cannot be two of one ring.
+pub fn same_identity(counters: &ForwardingCounters) -> Option<String> {
+    let reason = "the ACTIVE has the same bytes 3 to 5 in its address as an interface here, so neither can tell its \
+                  frames from those of the other: give that interface another address (ip link set IF address ...)";
+    (counters.same_identity > 0).then(|| reason.to_owned())
+}
+
+/// The counters in a line.
+pub fn in_line(counters: &ForwardingCounters) -> String {
+    let ForwardingCounters { on_main, on_redundant, sent_back, again, own, not_ethercat, too_old, no_link, .. } =
+        counters;
+    format!(
+        "forwarded {on_main} on MAIN, {on_redundant} on RED, of these {sent_back} back; not forwarded: {again} again, \
+         {own} own, {not_ethercat} not EtherCAT, {too_old} too old, {no_link} without a link"
+    )
+}
