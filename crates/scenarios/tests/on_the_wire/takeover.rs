@@ -1,24 +1,80 @@
-//! Two controllers, each `ringcat standby` in a namespace of its own, at one ring: one is killed, the other takes over.
+//! Two controllers, each `ringcat standby` in a namespace of its own, at one ring: one ends, hangs, loses the bus or
+//! hands the role over, and the other one goes on.
 
+use std::fs;
 use std::time::{Duration, Instant};
 
+use serde_json::Value;
+
 use crate::bench::{Bench, await_op};
+use crate::documented::Page;
 use crate::running::Running;
-use crate::{RING_OF_10, states};
+use crate::{RING_OF_10, said, states};
 
 const CYCLE_MS: f64 = 5.0;
 /// A busy machine reaches each state within this time.
 const LIMIT: Duration = Duration::from_secs(20);
 /// Options of both controllers. The machine may be busy: a stall of less than 40 ms is no death.
-const DECLARED: [&str; 9] =
-    ["--automatic", "--cycle", "5ms", "--listen", "300ms", "--timeout", "10", "--guard", "40ms"];
+const ROLE: [&str; 6] = ["--listen", "300ms", "--timeout", "10", "--guard", "40ms"];
+const AUTOMATIC: [&str; 3] = ["--automatic", "--cycle", "5ms"];
+const TAKEN_OVER: &str = "taken over: 10 SubDevices go on as they are";
+const READY: &str = "the other MainDevice: ready";
+
+/// Two controllers at a simulated ring of 10.
+struct Pair {
+    bench: Bench,
+    declared: Vec<String>,
+}
+
+impl Pair {
+    fn new() -> Option<Pair> {
+        let mut bench = Bench::new(2)?;
+        bench.add_second_main_device();
+        bench.simulate(&RING_OF_10.segment(), true);
+        Some(Pair { bench, declared: AUTOMATIC.map(str::to_owned).to_vec() })
+    }
+
+    fn arguments<'a>(&'a self, links: [&'a str; 2], more: &[&'a str]) -> Vec<&'a str> {
+        let declared: Vec<&str> = self.declared.iter().map(String::as_str).collect();
+        let links = ["standby", "--main", links[0], "--redundant", links[1]];
+        [&links[..], &declared, &ROLE, more].concat()
+    }
+
+    fn first(&self, more: &[&str]) -> Running {
+        self.bench.run_ringcat(&self.arguments(["main0", "active1"], more))
+    }
+
+    fn second(&self, more: &[&str]) -> Running {
+        self.bench.run_other_ringcat(&self.arguments(["second0", "main1"], more))
+    }
+
+    /// The first one in OP as ACTIVE, the second one as its standby, which it knows to be ready.
+    fn in_op(&self, more: &[&str]) -> (Running, Running) {
+        let first = self.first(more);
+        await_op(&self.bench, 10);
+        let second = self.second(more);
+        await_words(&first, READY);
+        (first, second)
+    }
+
+    fn all_are_in(&self, state: &str) {
+        assert_eq!(states(&self.bench, state), 10, "{}", self.bench.order("status"));
+    }
+}
 
 /// Waits until a controller has said this.
 fn await_words(controller: &Running, words: &str) {
+    await_that(words, &[controller], || controller.said().so_far().contains(words));
+}
+
+/// Waits until something holds.
+fn await_that(what: &str, controllers: &[&Running], holds: impl Fn() -> bool) {
     let until = Instant::now() + LIMIT;
-    while !controller.said().so_far().contains(words) {
-        let (said, errors) = (controller.said().so_far(), controller.errors().so_far());
-        assert!(Instant::now() < until, "not within {LIMIT:?}: {words}\n{said}{errors}");
+    while !holds() {
+        if Instant::now() >= until {
+            let text = |it: &&Running| format!("{}{}\n", it.said().so_far(), it.errors().so_far());
+            panic!("not within {LIMIT:?}: {what}\n{}", controllers.iter().map(text).collect::<String>());
+        }
         std::thread::sleep(Duration::from_millis(5));
     }
 }
@@ -33,33 +89,159 @@ fn silence_ms(said: &str) -> f64 {
 // covers: standby, MR-01, MR-07, MR-21, REQ012
 #[test]
 fn a_killed_active_is_taken_over_and_comes_back_and_no_subdevice_leaves_op() {
-    let Some(mut bench) = Bench::new(2) else { return };
-    bench.add_second_main_device();
-    bench.simulate(&RING_OF_10.segment(), true);
-    let start_first =
-        || bench.run_ringcat(&[&["standby", "--main", "main0", "--redundant", "active1"], &DECLARED[..]].concat());
-    let first = start_first();
-    await_op(&bench, 10);
-    let arguments = [&["standby", "--main", "second0", "--redundant", "main1"], &DECLARED[..]].concat();
-    let second = bench.run_other_ringcat(&arguments);
-    await_words(&first, "the other MainDevice: ready");
+    let Some(pair) = Pair::new() else { return };
+    let (first, second) = pair.in_op(&[]);
     first.signal("-KILL");
-    await_words(&second, "taken over: 10 SubDevices go on as they are");
-    assert_eq!(states(&bench, "OP"), 10, "{}", bench.order("status"));
+    await_words(&second, TAKEN_OVER);
+    pair.all_are_in("OP");
     let silence = silence_ms(&second.said().so_far());
     println!("without process data: {silence} ms, {:.0} cycles missing", (silence / CYCLE_MS - 1.0).max(0.0));
     // The killed one is started again, follows, and is handed the role over.
     drop(first);
-    let first = start_first();
+    let first = pair.first(&[]);
     await_words(&first, "INACTIVE: cycles run");
-    await_words(&second, "the other MainDevice: ready");
+    await_words(&second, READY);
     let (said, errors) = second.interrupt();
     assert!(said.contains("result: ok: handed the role over, takeovers: 1"), "{said}{errors}");
     await_words(&first, "ACTIVE (handed over)");
-    assert_eq!(states(&bench, "OP"), 10, "{}", bench.order("status"));
+    pair.all_are_in("OP");
     let (said, errors) = first.interrupt();
     assert!(said.contains("stopped: outputs zero, all SubDevices in INIT"), "{said}{errors}");
     assert!(said.contains("result: ok: stopped the bus as ACTIVE, takeovers: 1"), "{said}{errors}");
-    assert_eq!(states(&bench, "INIT"), 10, "{}", bench.order("status"));
-    bench.show_simulator_lateness();
+    pair.all_are_in("INIT");
+    pair.bench.show_simulator_lateness();
+}
+
+// covers: standby, MR-21
+#[test]
+fn a_stopped_active_is_off_before_the_other_takes_over_and_ends_when_it_goes_on() {
+    let Some(pair) = Pair::new() else { return };
+    let (first, second) = pair.in_op(&[]);
+    first.signal("-STOP");
+    await_words(&second, TAKEN_OVER);
+    let on = pair.bench.links_main();
+    let is_on = |name: &str| on.lines().any(|line| line.contains(&format!("{name}@")) && line.contains(",UP"));
+    assert!(!is_on("main0") && !is_on("active1"), "{on}");
+    first.signal("-CONT");
+    let (said, errors) = first.finish(LIMIT);
+    assert!(said.contains("FAILED") && said.contains("the guard has switched both off"), "{said}{errors}");
+    pair.all_are_in("OP");
+    let (said, errors) = second.interrupt();
+    assert!(said.contains("result: ok: stopped the bus as ACTIVE, takeovers: 1"), "{said}{errors}");
+    pair.all_are_in("INIT");
+    pair.bench.show_simulator_lateness();
+}
+
+// covers: standby, MR-07
+#[test]
+fn an_active_that_loses_all_its_cables_yields_and_follows_when_they_are_back() {
+    let Some(pair) = Pair::new() else { return };
+    let (first, second) = pair.in_op(&[]);
+    pair.bench.ip_main("link set active1 down");
+    pair.bench.set_link("main0", "down");
+    await_words(&first, "INACTIVE (all links lost)");
+    await_words(&second, TAKEN_OVER);
+    pair.all_are_in("OP");
+    pair.bench.ip_main("link set active1 up");
+    pair.bench.set_link("main0", "up");
+    await_words(&second, READY);
+    pair.all_are_in("OP");
+    let (said, errors) = second.interrupt();
+    assert!(said.contains("result: ok: handed the role over, takeovers: 1"), "{said}{errors}");
+    await_words(&first, "ACTIVE (handed over)");
+    pair.all_are_in("OP");
+    let (said, errors) = first.interrupt();
+    assert!(said.contains("result: ok: stopped the bus as ACTIVE, takeovers: 1"), "{said}{errors}");
+    pair.bench.show_simulator_lateness();
+}
+
+// covers: standby, MR-09, MR-10, MR-24, REQ016
+#[test]
+fn of_two_controllers_that_each_have_half_the_ring_one_yields_when_it_is_mended() {
+    let Some(pair) = Pair::new() else { return };
+    let (first, second) = pair.in_op(&[]);
+    pair.bench.order("cut 4-5");
+    await_words(&first, "ring open:");
+    pair.bench.ip_main("link set active1 down");
+    await_words(&second, "taken over: ");
+    pair.bench.order("heal 4-5");
+    let yields = |it: &Running| {
+        let said = it.said().so_far();
+        said.split_once("collision: another MainDevice sends, too").is_some_and(|(_, rest)| rest.contains("INACTIVE ("))
+    };
+    await_that("one of them yields", &[&first, &second], || yields(&first) || yields(&second));
+    // Which one follows from the addresses of their interfaces.
+    let (active, inactive) = if yields(&first) { (second, first) } else { (first, second) };
+    await_op(&pair.bench, 10);
+    assert!(!yields(&active), "{}", active.said().so_far());
+    let (said, errors) = inactive.interrupt();
+    assert!(said.contains("FAILED: collisions with another ACTIVE: "), "{said}{errors}");
+    await_op(&pair.bench, 10);
+    let (said, errors) = active.interrupt();
+    assert!(said.contains("FAILED: collisions with another ACTIVE: "), "{said}{errors}");
+    assert!(said.contains("stopped: outputs zero, all SubDevices in INIT"), "{said}{errors}");
+    pair.bench.show_simulator_lateness();
+}
+
+// covers: standby, MR-07
+#[test]
+fn a_permanent_standby_follows_and_never_takes_over() {
+    let Some(pair) = Pair::new() else { return };
+    let first = pair.first(&[]);
+    await_op(&pair.bench, 10);
+    let second = pair.second(&["--permanent-standby"]);
+    await_words(&second, "INACTIVE: cycles run");
+    first.signal("-KILL");
+    // The watchdogs of the outputs expire.
+    await_that("outputs leave OP", &[&second], || states(&pair.bench, "OP") <= 5);
+    std::thread::sleep(Duration::from_secs(1));
+    let (said, errors) = second.interrupt();
+    assert!(!said.contains("taken over"), "{said}{errors}");
+    assert!(said.contains("result: ok: left as INACTIVE, takeovers: 0"), "{said}{errors}");
+}
+
+// covers: standby, json, REQ010
+#[test]
+fn controllers_with_a_network_file_print_json_and_name_a_difference_of_the_files() {
+    let Some(mut pair) = Pair::new() else { return };
+    let path = |name: &str| {
+        let name = format!("ringcat-takeover-{name}-{}.toml", std::process::id());
+        std::env::temp_dir().join(name).display().to_string()
+    };
+    let (same, other) = (path("same"), path("other"));
+    for (file, cycle) in [(&same, "5ms"), (&other, "10ms")] {
+        let arguments = ["init", "--main", "main0", "--cycle", cycle, "--overwrite", "--out", file];
+        let output = pair.bench.ringcat(&arguments);
+        assert!(output.status.success(), "{:?}", said(&output));
+    }
+    pair.declared = vec!["--network".to_owned(), same.clone()];
+    let (first, second) = pair.in_op(&["--json"]);
+    let (text, errors) = first.interrupt();
+    let result = Page::read().check("standby", &text);
+    let takeover = |result: &Value, key: &str| result["takeover"][key].clone();
+    assert_eq!(takeover(&result, "handed_over"), true, "{text}{errors}");
+    assert_eq!(takeover(&result, "role"), "active", "{text}{errors}");
+    let is_event = |line: &&str, name: &str| line.contains(&format!("\"event\":\"{name}\""));
+    for name in ["RoleChanged", "Partner"] {
+        assert!(text.lines().any(|line| is_event(&line, name)), "{name}: {text}");
+    }
+    await_words(&second, "ACTIVE (handed over)");
+    pair.all_are_in("OP");
+    // The file of the one that joins differs.
+    pair.declared = vec!["--network".to_owned(), other.clone()];
+    let first = pair.first(&[]);
+    await_words(&second, "ConfigurationDiffers");
+    await_words(&first, "the other MainDevice has another configuration");
+    let (said, errors) = first.interrupt();
+    assert!(said.contains("FAILED: the other MainDevice differs: "), "{said}{errors}");
+    pair.all_are_in("OP");
+    let (text, errors) = second.interrupt();
+    let result = Page::read().check("standby", &text);
+    let counted = ["takeovers", "collisions"].map(|key| takeover(&result, key));
+    assert_eq!(counted, [1.into(), 0.into()], "{text}{errors}");
+    assert_eq!(takeover(&result, "stopped"), true, "{text}{errors}");
+    assert!(takeover(&result, "configuration_differences").as_u64() > Some(0), "{text}{errors}");
+    for file in [same, other] {
+        fs::remove_file(file).expect("it was written");
+    }
 }
