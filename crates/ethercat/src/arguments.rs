@@ -62,8 +62,8 @@ pub const OPTIONS: [(char, &str, bool); 12] = [
     ('h', "help", false),
 ];
 
-/// Options of our own: name, and whether a value follows. An abbreviation means one of them only where it means none of [`OPTIONS`]:
-/// scripts for the original tool go on working.
+/// Options of our own: name, and whether a value follows. An abbreviation means one of them only where it means none of
+/// [`OPTIONS`]: scripts for the original tool go on working.
 pub const OWN: [(&str, bool); 4] = [("main", true), ("redundant", true), ("sim", true), ("follow", false)];
 
 impl Arguments {

@@ -38,8 +38,7 @@ struct Shown {
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let masters = session.masters()?;
     let is_alone = masters.len() == 1;
-    let mut all: Vec<Shown> =
-        masters.iter().map(|it| Shown { master: it.master, next: 0, epoch: None }).collect();
+    let mut all: Vec<Shown> = masters.iter().map(|it| Shown { master: it.master, next: 0, epoch: None }).collect();
     loop {
         for shown in &mut all {
             while show(session, shown, is_alone)? {}
@@ -70,7 +69,7 @@ fn show(session: &mut Session<'_>, shown: &mut Shown, is_alone: bool) -> Result<
     for EventLine { at_ns, text, .. } in &events {
         let (seconds, micros) = (at_ns / 1_000_000_000, at_ns / 1_000 % 1_000_000);
         let of_master = if is_alone { String::new() } else { format!("{master}: ") };
-        write!(session, "{of_master}[{seconds:5}.{micros:06}] {text}\n")?;
+        writeln!(session, "{of_master}[{seconds:5}.{micros:06}] {text}")?;
     }
     let has_more = next > shown.next && !events.is_empty();
     shown.next = next;

@@ -1,6 +1,7 @@
 //! `ring`: the ring, its links and its cables. Not a command of the original tool.
 
 use ringcat_control::message::{Answer, CableSnapshot, Query, Snapshot};
+use ringcat_control::tool::{ToolAnswer, ToolQuery};
 
 use crate::failure::{Failure, unexpected};
 use crate::session::Session;
@@ -11,8 +12,9 @@ pub const COMMAND: Command = Command {
     name: "ring",
     summary: "Show the ring: slaves on each link, a break, errors of cables.",
     forms: &[""],
-    help: "Damaged frames and lost links are counted at both ends of each cable
-while an application is active. Not a command of IgH.
+    help: "Cables and the place of a break are known while an application is active:
+then damaged frames and lost links are counted at both ends of each cable.
+Not a command of IgH.
 ",
     options: "",
     run,
@@ -31,27 +33,26 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         let (Answer::Overview(seen), _) = session.ask(number, Query::Overview, Vec::new())? else {
             return Err(unexpected());
         };
+        let ToolAnswer::Master(report) = session.tool(number, ToolQuery::Master)? else { return Err(unexpected()) };
         if masters.len() > 1 {
             writeln!(session, "Master{number}")?;
         }
-        session.write(text(&state, seen.counts).as_bytes())?;
+        session.write(text(&state, seen.counts, report.links.len()).as_bytes())?;
     }
     Ok(())
 }
 
-fn text(state: &Snapshot, counts: [u16; 2]) -> String {
+fn text(state: &Snapshot, counts: [u16; 2], links: usize) -> String {
     let ring = &state.ring;
-    // A bus on one link knows nothing of a second one.
-    let is_single = ring.links[1].carrier.is_none() && ring.redundant.is_none() && ring.closed != Some(false);
     let shown = match (ring.closed, ring.redundant) {
-        _ if is_single => "one link",
+        _ if links < LINKS.len() => "one link",
         (Some(true), Some(false)) => "closed, frames are lost in one direction",
         (Some(true), _) => "closed",
         (Some(false), _) => "OPEN: the next break isolates slaves",
         (None, _) => "unknown",
     };
     let mut text = format!("ring        {shown}\n");
-    for ((name, link), count) in LINKS.iter().zip(&ring.links).zip(counts).take(if is_single { 1 } else { 2 }) {
+    for ((name, link), count) in LINKS.iter().zip(&ring.links).zip(counts).take(links) {
         let carrier = if link.carrier == Some(false) { ", no carrier" } else { "" };
         text += &format!("{name:<11} {count} slaves{carrier}\n");
     }

@@ -89,7 +89,8 @@ fn a_new_daemon_waits_for_the_application_of_a_killed_one_and_names_it() {
 // covers: daemon
 #[test]
 fn the_daemon_of_one_command_ends_with_its_input_and_so_does_its_segment() {
-    let mut running = Running::with_input(&Start { counts: &[3], options: &["--while-input-is-open"], ..Start::default() });
+    let mut running =
+        Running::with_input(&Start { counts: &[3], options: &["--while-input-is-open"], ..Start::default() });
     wait_for(&mut running.client(), 0, 3);
     assert_eq!(running.segments().len(), 1);
     drop(running.child.stdin.take());

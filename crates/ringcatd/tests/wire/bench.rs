@@ -149,7 +149,11 @@ impl Bench {
                 fs::remove_file(entry.path()).expect("it is ours");
             }
         }
-        self.start_program(&["setpriv", "--reuid", USER, "--regid", USER, "--clear-groups", program], options, &self.socket())
+        self.start_program(
+            &["setpriv", "--reuid", USER, "--regid", USER, "--clear-groups", program],
+            options,
+            &self.socket(),
+        )
     }
 
     fn start_program(&mut self, program: &[&str], options: &[&str], socket: &Path) -> usize {

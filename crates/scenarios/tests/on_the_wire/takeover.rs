@@ -177,9 +177,10 @@ fn of_two_controllers_that_each_have_half_the_ring_one_yields_when_it_is_mended(
     let (said, errors) = inactive.interrupt();
     assert!(said.contains("FAILED: collisions with another ACTIVE: "), "{said}{errors}");
     await_op(&pair.bench, 10);
+    // It may not have heard the other one, which yields in the cycle that shows the collision.
     let (said, errors) = active.interrupt();
-    assert!(said.contains("FAILED: collisions with another ACTIVE: "), "{said}{errors}");
     assert!(said.contains("stopped: outputs zero, all SubDevices in INIT"), "{said}{errors}");
+    pair.all_are_in("INIT");
     pair.bench.show_simulator_lateness();
 }
 
@@ -238,7 +239,7 @@ fn controllers_with_a_network_file_print_json_and_name_a_difference_of_the_files
     let (text, errors) = second.interrupt();
     let result = Page::read().check("standby", &text);
     let counted = ["takeovers", "collisions"].map(|key| takeover(&result, key));
-    assert_eq!(counted, [1.into(), 0.into()], "{text}{errors}");
+    assert_eq!(counted, [Value::from(1), Value::from(0)], "{text}{errors}");
     assert_eq!(takeover(&result, "stopped"), true, "{text}{errors}");
     assert!(takeover(&result, "configuration_differences").as_u64() > Some(0), "{text}{errors}");
     for file in [same, other] {

@@ -24,12 +24,14 @@ const EFFECTS: u64 = 12;
 struct Signals {
     pulses: Pulses,
     times: Vec<Vec<SimTime>>,
+    /// Nanoseconds that are added to their times.
+    later: u64,
 }
 
 impl Signals {
-    fn new(network: &Network) -> Signals {
+    fn new(network: &Network, later: u64) -> Signals {
         let devices = network.devices().len();
-        Signals { pulses: Pulses::new(network, 0..devices, CYCLE_NS.into()), times: vec![Vec::new(); devices] }
+        Signals { pulses: Pulses::new(network, 0..devices, CYCLE_NS.into()), times: vec![Vec::new(); devices], later }
     }
 
     fn observe(&mut self, network: &Network) {
@@ -43,7 +45,7 @@ impl Signals {
 
     /// Whether a device has had a signal after the first time, and not after the second one.
     fn between(&self, device: usize, first: SimTime, second: SimTime) -> bool {
-        self.times[device].iter().any(|at| first < *at && *at <= second)
+        self.times[device].iter().map(|at| SimTime(at.0 + self.later)).any(|at| first < at && at <= second)
     }
 }
 
@@ -118,34 +120,50 @@ fn faults(count: usize, in_ring: bool) -> Vec<Fault> {
     faults
 }
 
-// covers: lost-frames, clocks
+/// What devices saw, frames that were sent again, and faults after which none was. Signals are taken for later ones.
+fn look(count: usize, in_ring: bool, later: u64) -> (Seen, u64, u64) {
+    let (mut seen, mut sent_again, mut refused) = (Seen::default(), 0, 0);
+    for base in (0..CYCLE_NS).step_by(100_000) {
+        // All signals at once, or one after the other.
+        let step = if base % 200_000 == 0 { 0 } else { 70_000 };
+        let shift = |at: usize| (base + at as u32 * step) % CYCLE_NS;
+        let mut world = world(count, in_ring, |at| shift(at) as i32);
+        let mut signals = Signals::new(world.network(), later);
+        for (number, fault) in faults(count, in_ring).into_iter().enumerate() {
+            let since = world.now();
+            let before = world.application().cyclic_counters().sent_again;
+            world.fault_in(MS * (number as u32 % 10) / 10, fault.clone());
+            for _ in 0..EFFECTS {
+                world.cycle();
+                signals.observe(world.network());
+            }
+            let what = format!("{count}, ring {in_ring}, shift {base} ns, step {step} ns, {fault:?}");
+            seen.look(&world, &signals, since, &what);
+            let tries = world.application().cyclic_counters().sent_again - before;
+            (sent_again, refused) = (sent_again + tries, refused + u64::from(tries == 0));
+        }
+        assert_eq!(world.left_op(world.beginning()), []);
+    }
+    println!("{count}, ring {in_ring}: {sent_again} sent again, {refused} not, {} taken twice", seen.repeated);
+    (seen, sent_again, refused)
+}
+
+// covers: lost-frames, dc-sync
 #[test]
 fn no_output_comes_twice_across_sync0_at_any_shift_in_lines_and_rings() {
     for (count, in_ring) in [(2, false), (3, false), (4, true), (10, true)] {
-        let (mut seen, mut sent_again, mut refused) = (Seen::default(), 0, 0);
-        for base in (0..CYCLE_NS).step_by(100_000) {
-            // All signals at once, or one after the other.
-            let step = if base % 200_000 == 0 { 0 } else { 70_000 };
-            let shift = |at: usize| (base + at as u32 * step) % CYCLE_NS;
-            let mut world = world(count, in_ring, |at| shift(at) as i32);
-            let mut signals = Signals::new(world.network());
-            for (number, fault) in faults(count, in_ring).into_iter().enumerate() {
-                let since = world.now();
-                let before = world.application().cyclic_counters().sent_again;
-                world.fault_in(MS * (number as u32 % 10) / 10, fault.clone());
-                for _ in 0..EFFECTS {
-                    world.cycle();
-                    signals.observe(world.network());
-                }
-                let what = format!("{count}, ring {in_ring}, shift {base} ns, step {step} ns, {fault:?}");
-                seen.look(&world, &signals, since, &what);
-                let tries = world.application().cyclic_counters().sent_again - before;
-                (sent_again, refused) = (sent_again + tries, refused + u64::from(tries == 0));
-            }
-            assert_eq!(world.left_op(world.beginning()), []);
-        }
-        println!("{count}, ring {in_ring}: {sent_again} sent again, {refused} not, {} taken twice", seen.repeated);
+        let (seen, sent_again, refused) = look(count, in_ring, 0);
         assert!(seen.across.is_empty(), "{:#?}", seen.across);
         assert!(sent_again > 0 && seen.repeated > 0 && refused > 0, "{count}: {sent_again}, {seen:?}, {refused}");
+    }
+}
+
+/// What the check above sees: signals that came at other times than declared would be between two tries.
+// covers: lost-frames
+#[test]
+fn outputs_come_twice_across_signals_that_are_later_than_declared() {
+    for (count, in_ring) in [(2, false), (4, true)] {
+        let (seen, sent_again, _) = look(count, in_ring, u64::from(CYCLE_NS) / 2);
+        assert!(!seen.across.is_empty() && sent_again > 0, "{count}: {sent_again}, {seen:?}");
     }
 }
