@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use ringcat_control::client::ClientError;
-use ringcat_control::message::{Answer, MasterState, Query};
+use ringcat_control::message::{Answer, MasterState, Query, Snapshot};
 use ringcat_control::socket::to_connect_to;
 use ringcat_control::tool::{MOST_SUBDEVICES, Piece, SubDeviceLine, ToolAnswer, ToolQuery};
 use ringcat_control::{Client, Refusal};
@@ -24,9 +24,9 @@ pub struct Session<'a> {
     pub arguments: Arguments,
     socket: &'a Path,
     client: Option<Client>,
-    /// Links of a bus without a daemon, until it is used.
+    /// Links of a bus without a daemon: no other bus is asked then.
     links: Option<String>,
-    standalone: Option<Standalone>,
+    _standalone: Option<Standalone>,
     output: &'a mut dyn Write,
     errors: &'a mut dyn Write,
 }
@@ -45,7 +45,7 @@ impl<'a> Session<'a> {
         output: &'a mut dyn Write,
         errors: &'a mut dyn Write,
     ) -> Session<'a> {
-        Session { name, arguments, socket, client: None, links: None, standalone: None, output, errors }
+        Session { name, arguments, socket, client: None, links: None, _standalone: None, output, errors }
     }
 
     /// On these links instead, which a daemon of this command drives from the first question on.
@@ -97,12 +97,16 @@ impl<'a> Session<'a> {
     }
 
     fn client(&mut self) -> Result<&mut Client, Failure> {
-        if let Some(links) = self.links.take() {
-            self.standalone = Some(Standalone::start(&links)?);
-        }
         if self.client.is_none() {
-            let own = self.standalone.as_ref().map(Standalone::socket);
-            self.client = Some(Client::connect(own.as_deref().unwrap_or(self.socket), "ethercat")?);
+            let client = match &self.links {
+                Some(links) => {
+                    let (standalone, client) = Standalone::start(links)?;
+                    self._standalone = Some(standalone);
+                    client
+                }
+                None => Client::connect(self.socket, "ethercat")?,
+            };
+            self.client = Some(client);
         }
         self.client.as_mut().ok_or_else(unexpected)
     }
@@ -113,6 +117,17 @@ impl<'a> Session<'a> {
     /// The daemon refuses, or is not there.
     pub fn ask(&mut self, master: u32, ask: Query, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), Failure> {
         Ok(self.client()?.ask_patiently(master, &ask, &bytes)?)
+    }
+
+    /// The whole state of a master.
+    ///
+    /// # Errors
+    /// As [`Session::ask`].
+    pub fn state(&mut self, master: u32) -> Result<Box<Snapshot>, Failure> {
+        match self.ask(master, Query::State, Vec::new())? {
+            (Answer::State(state), _) => Ok(state),
+            _ => Err(unexpected()),
+        }
     }
 
     /// Asks a question of the tool.

@@ -36,10 +36,7 @@ const MASTER: u32 = 0;
 
 /// The daemon of one command.
 #[derive(Debug)]
-pub struct Standalone {
-    daemon: Child,
-    directory: PathBuf,
-}
+pub struct Standalone(Child);
 
 /// The links that the options name, as the option of the daemon; `None` without such an option.
 ///
@@ -58,76 +55,46 @@ pub fn links(arguments: &Arguments) -> Result<Option<String>, String> {
 
 impl Standalone {
     /// Starts the daemon on these links, and waits until the segment is known and its SubDevices are in PREOP or stay
-    /// where they are.
+    /// where they are. The daemon, and the connection to it.
     ///
     /// # Errors
     /// The daemon cannot be started, or cannot drive the bus.
-    pub fn start(links: &str) -> Result<Standalone, Failure> {
-        let directory = private_directory()?;
+    pub fn start(links: &str) -> Result<(Standalone, Client), Failure> {
+        let begin = Instant::now();
+        let directory = PrivateDirectory::new()?;
+        let socket = directory.0.join("control");
         let spawned = Command::new(program())
             .args(["--while-input-is-open", "--no-eoe", "--master"])
             .arg(format!("{MASTER}={links}"))
             .arg("--socket")
-            .arg(directory.join("control"))
+            .arg(&socket)
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
             .spawn();
-        let daemon = spawned.map_err(|error| {
-            // It is empty.
-            let _ = fs::remove_dir(&directory);
-            Failure::failed(format!("'{}' cannot be started: {error}", program().display()))
-        })?;
-        let mut standalone = Standalone { daemon, directory };
-        standalone.wait_until_ready()?;
-        Ok(standalone)
+        let cannot = |error| Failure::failed(format!("'{}' cannot be started: {error}", program().display()));
+        let mut standalone = Standalone(spawned.map_err(cannot)?);
+        let mut client = standalone.connect(&socket, begin)?;
+        // The connection is enough: nothing is left where the command is ended by a signal.
+        drop(directory);
+        check(&mut client)?;
+        settle(&mut client, begin)?;
+        Ok((standalone, client))
     }
 
-    /// Where it listens.
-    pub fn socket(&self) -> PathBuf {
-        self.directory.join("control")
-    }
-
-    fn wait_until_ready(&mut self) -> Result<(), Failure> {
-        let begin = Instant::now();
-        let late = |what: &str| Failure::failed(format!("{what} after {} s", START.as_secs()));
-        let mut client = loop {
-            match Client::connect(&self.socket(), "ethercat") {
-                Ok(client) => break client,
+    /// Waits until the daemon answers.
+    fn connect(&mut self, socket: &Path, begin: Instant) -> Result<Client, Failure> {
+        loop {
+            match Client::connect(socket, "ethercat") {
+                Ok(client) => return Ok(client),
                 Err(ClientError::NoDaemon { .. }) => {}
                 Err(error) => return Err(error.into()),
             }
-            if let Ok(Some(_)) = self.daemon.try_wait() {
+            if let Ok(Some(_)) = self.0.try_wait() {
                 return Err(Failure::failed(self.said()));
             }
             if begin.elapsed() >= START {
                 return Err(late("ringcatd does not answer"));
-            }
-            std::thread::sleep(LOOK);
-        };
-        if let (Answer::Masters(masters), _) = client.ask_patiently(MASTER, &Query::Masters, &[])?
-            && let Some(fault) = masters.into_iter().find_map(|master| master.fault)
-        {
-            return Err(Failure::failed(fault));
-        }
-        let (mut last, mut since) = (None, Instant::now());
-        loop {
-            let report = master(&mut client)?;
-            let states = states(&mut client)?;
-            if last.as_ref() != Some(&states) {
-                (last, since) = (Some(states.clone()), Instant::now());
-            }
-            let are_in_preop = !states.is_empty() && states.iter().all(|state| *state == Some(PREOP));
-            let has_link = report.links.iter().any(|link| link.carrier != Some(false));
-            if has_link && !report.is_scanning && (are_in_preop || since.elapsed() >= STILL) {
-                return Ok(());
-            }
-            if !has_link && begin.elapsed() >= LINK {
-                let text = "no link: is the cable plugged in, and has the first slave power?";
-                return Err(Failure::failed(text));
-            }
-            if begin.elapsed() >= START {
-                return Err(late("the slaves are not in PREOP"));
             }
             std::thread::sleep(LOOK);
         }
@@ -136,7 +103,7 @@ impl Standalone {
     /// What the daemon has said before its end.
     fn said(&mut self) -> String {
         let mut text = String::new();
-        if let Some(stderr) = &mut self.daemon.stderr {
+        if let Some(stderr) = &mut self.0.stderr {
             // What cannot be read was not said.
             let _ = stderr.read_to_string(&mut text);
         }
@@ -150,10 +117,47 @@ impl Standalone {
 impl Drop for Standalone {
     fn drop(&mut self) {
         // It may have ended. Nothing is under way: the command has its answers.
-        let _ = self.daemon.kill();
-        let _ = self.daemon.wait();
-        // A directory that stays is empty but for a socket.
-        let _ = fs::remove_dir_all(&self.directory);
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn late(what: &str) -> Failure {
+    Failure::failed(format!("{what} after {} s", START.as_secs()))
+}
+
+/// Whether the daemon drives the bus.
+fn check(client: &mut Client) -> Result<(), Failure> {
+    match client.ask_patiently(MASTER, &Query::Masters, &[])? {
+        (Answer::Masters(masters), _) => match masters.into_iter().find_map(|master| master.fault) {
+            Some(fault) => Err(Failure::failed(fault)),
+            None => Ok(()),
+        },
+        _ => Err(unexpected()),
+    }
+}
+
+/// Waits until the segment is known and its SubDevices are in PREOP, or stay where they are.
+fn settle(client: &mut Client, begin: Instant) -> Result<(), Failure> {
+    let (mut last, mut since) = (None, Instant::now());
+    loop {
+        let report = master(client)?;
+        let states = states(client)?;
+        let are_in_preop = !states.is_empty() && states.iter().all(|state| *state == Some(PREOP));
+        if last.as_ref() != Some(&states) {
+            (last, since) = (Some(states), Instant::now());
+        }
+        let has_link = report.links.iter().any(|link| link.carrier != Some(false));
+        if has_link && !report.is_scanning && (are_in_preop || since.elapsed() >= STILL) {
+            return Ok(());
+        }
+        if !has_link && begin.elapsed() >= LINK {
+            return Err(Failure::failed("no link: is the cable plugged in, and has the first slave power?"));
+        }
+        if begin.elapsed() >= START {
+            return Err(late("the slaves are not in PREOP"));
+        }
+        std::thread::sleep(LOOK);
     }
 }
 
@@ -181,19 +185,29 @@ fn program() -> PathBuf {
     beside.filter(|path| path.is_file()).unwrap_or_else(|| PathBuf::from(PROGRAM))
 }
 
-/// A new directory that only this user can enter.
-fn private_directory() -> Result<PathBuf, Failure> {
-    let failed = |path: &Path, error| Failure::failed(format!("'{}' cannot be made: {error}", path.display()));
-    for number in 0..u32::MAX {
-        let path = std::env::temp_dir().join(format!("ethercat-{}-{number}", std::process::id()));
-        match fs::DirBuilder::new().mode(0o700).create(&path) {
-            Ok(()) => return Ok(path),
-            // One of an earlier process with this number.
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
-            Err(error) => return Err(failed(&path, error)),
+/// A new directory that only this user can enter. It is removed with what is in it when this is dropped.
+struct PrivateDirectory(PathBuf);
+
+impl PrivateDirectory {
+    fn new() -> Result<PrivateDirectory, Failure> {
+        for number in 0..u32::MAX {
+            let path = std::env::temp_dir().join(format!("ethercat-{}-{number}", std::process::id()));
+            match fs::DirBuilder::new().mode(0o700).create(&path) {
+                Ok(()) => return Ok(PrivateDirectory(path)),
+                // One of an earlier process with this number.
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(Failure::failed(format!("'{}' cannot be made: {error}", path.display()))),
+            }
         }
+        Err(Failure::failed("there is no name for a temporary directory"))
     }
-    Err(Failure::failed("there is no name for a temporary directory"))
+}
+
+impl Drop for PrivateDirectory {
+    fn drop(&mut self) {
+        // What stays is a socket that nothing listens at.
+        let _ = fs::remove_dir_all(&self.0);
+    }
 }
 
 #[cfg(test)]

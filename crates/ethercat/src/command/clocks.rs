@@ -1,8 +1,8 @@
 //! `clocks`: the distributed clocks. Not a command of the original tool.
 
-use ringcat_control::message::{Answer, ClockSnapshot, Query};
+use ringcat_control::message::ClockSnapshot;
 
-use crate::failure::{Failure, unexpected};
+use crate::failure::Failure;
 use crate::session::Session;
 use crate::shape::Command;
 
@@ -27,9 +27,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let masters = session.masters()?;
     for master in &masters {
         let number = master.master;
-        let (Answer::State(state), _) = session.ask(number, Query::State, Vec::new())? else {
-            return Err(unexpected());
-        };
+        let state = session.state(number)?;
         if masters.len() > 1 {
             writeln!(session, "Master{number}")?;
         }

@@ -17,9 +17,9 @@ pub const COMMAND: Command = Command {
     summary: "Show events of the bus: states, cables, the ring, faults.",
     forms: &[""],
     help: "One line for each event: seconds since the host was started, and the
-event in words. The last 1024 or so are kept by the daemon, or by the
-application that drives the bus: each begins anew. With several masters a
-line begins with the number of its master. Not a command of IgH.
+event in words. The daemon, or the application that drives the bus, keeps the
+last 4096; each begins anew. With several masters a line begins with the
+number of its master. Not a command of IgH.
 ",
     options: "  --follow               Go on with events as they come, until Ctrl-C.
 ",

@@ -27,9 +27,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let masters = session.masters()?;
     for master in &masters {
         let number = master.master;
-        let (Answer::State(state), _) = session.ask(number, Query::State, Vec::new())? else {
-            return Err(unexpected());
-        };
+        let state = session.state(number)?;
         let (Answer::Overview(seen), _) = session.ask(number, Query::Overview, Vec::new())? else {
             return Err(unexpected());
         };

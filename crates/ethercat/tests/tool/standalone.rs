@@ -1,9 +1,11 @@
 //! Commands without a daemon: `--sim`, and options that do not fit.
 
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
-use crate::bench::{Done, PROGRAM, directory, tool};
+use crate::bench::{Done, LONG, PROGRAM, directory, tool};
 
 /// Nothing listens there.
 const NOWHERE: &str = "/nothing/listens/here";
@@ -66,6 +68,43 @@ fn a_command_without_a_daemon_leaves_nothing_behind() {
     let left: Vec<_> = std::fs::read_dir(&directory).expect("it is there").flatten().map(|it| it.file_name()).collect();
     assert_eq!(left, ["segment.toml"]);
     std::fs::remove_dir_all(directory).expect("it is ours");
+}
+
+/// Processes that have this text in their command line.
+fn processes_with(text: &str) -> Vec<String> {
+    let all = std::fs::read_dir("/proc").expect("it is there").flatten();
+    let lines = all.filter_map(|entry| std::fs::read(entry.path().join("cmdline")).ok());
+    lines.map(|line| String::from_utf8_lossy(&line).replace('\0', " ")).filter(|line| line.contains(text)).collect()
+}
+
+// covers: daemon
+#[test]
+fn a_command_that_a_signal_ends_leaves_neither_files_nor_a_daemon_behind() {
+    if !has_daemon() {
+        return;
+    }
+    for signal in ["-INT", "-TERM", "-KILL"] {
+        let (directory, file) = segment();
+        let mut command = Command::new(PROGRAM);
+        command.args(["events", "--follow", "--sim", &file]).env("TMPDIR", &directory).stdin(Stdio::null());
+        let mut command = command.stdout(Stdio::piped()).spawn().expect("it starts");
+        let mut line = String::new();
+        let output = command.stdout.as_mut().expect("it is piped");
+        BufReader::new(output).read_line(&mut line).expect("it is text");
+        assert!(!line.is_empty());
+        let sent = Command::new("kill").args([signal, &command.id().to_string()]).status();
+        assert!(sent.is_ok_and(|status| status.success()));
+        assert!(!command.wait().expect("it ends").success());
+        let begin = Instant::now();
+        while !processes_with(&file).is_empty() {
+            assert!(begin.elapsed() < LONG, "{signal}: {:?}", processes_with(&file));
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let left: Vec<_> =
+            std::fs::read_dir(&directory).expect("it is there").flatten().map(|it| it.file_name()).collect();
+        assert_eq!(left, ["segment.toml"], "{signal}");
+        std::fs::remove_dir_all(directory).expect("it is ours");
+    }
 }
 
 // covers: daemon
