@@ -37,10 +37,14 @@ pub use options::StandbyArguments;
 const SILENT: Duration = Duration::from_secs(1);
 /// An interface without a carrier this long after it was switched on is reported.
 const CARRIER_LIMIT: Duration = Duration::from_secs(5);
+
 /// Forwards, and says what; takes over with a declaration.
 pub fn run(arguments: &StandbyArguments) -> Result<Report, Failure> {
     if arguments.automatic || arguments.declared.configured.is_given() {
         return takeover::run(arguments);
+    }
+    if arguments.declared.clocks || arguments.declared.clock_options.are_given() {
+        return Err(Failure::new("clocks need a declaration: add --eni, --network or --automatic"));
     }
     let end = EndRequest::watch(arguments.thread.priority)?;
     let names = &arguments.links;
@@ -163,6 +167,16 @@ mod tests {
         assert_eq!(parse(&["--no-guard"]).map(|(_, none)| none).ok(), Some(true));
         for wrong in [&["--guard", "999us"][..], &["--guard", "0ms"], &["--guard", "5ms", "--no-guard"]] {
             assert!(parse(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    // covers: standby
+    #[test]
+    fn clocks_without_a_declaration_are_refused_before_anything_is_opened() {
+        for option in ["--clocks", "--bus-shift"] {
+            let line = Line::try_parse_from(["standby", "--main", "a", "--redundant", "b", option]);
+            let refused = run(&line.expect("it is complete").standby).expect_err("it is refused").to_string();
+            assert!(refused.starts_with("clocks need a declaration"), "{option}: {refused}");
         }
     }
 
