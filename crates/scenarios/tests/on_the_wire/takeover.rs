@@ -79,6 +79,12 @@ fn await_that(what: &str, controllers: &[&Running], holds: impl Fn() -> bool) {
     }
 }
 
+/// Ends a controller in order, which says all of this.
+fn end(controller: Running, words: &[&str]) {
+    let (said, errors) = controller.interrupt();
+    assert!(words.iter().all(|words| said.contains(words)), "{words:?}: {said}{errors}");
+}
+
 /// The silence before the takeover, as the line about it says.
 fn silence_ms(said: &str) -> f64 {
     let line = said.lines().find(|line| line.contains("taken over: ")).expect("it took over");
@@ -101,13 +107,13 @@ fn a_killed_active_is_taken_over_and_comes_back_and_no_subdevice_leaves_op() {
     let first = pair.first(&[]);
     await_words(&first, "INACTIVE: cycles run");
     await_words(&second, READY);
-    let (said, errors) = second.interrupt();
-    assert!(said.contains("result: ok: handed the role over, takeovers: 1"), "{said}{errors}");
+    end(second, &["result: ok: handed the role over, takeovers: 1"]);
     await_words(&first, "ACTIVE (handed over)");
     pair.all_are_in("OP");
-    let (said, errors) = first.interrupt();
-    assert!(said.contains("stopped: outputs zero, all SubDevices in INIT"), "{said}{errors}");
-    assert!(said.contains("result: ok: stopped the bus as ACTIVE, takeovers: 1"), "{said}{errors}");
+    end(
+        first,
+        &["stopped: outputs zero, all SubDevices in INIT", "result: ok: stopped the bus as ACTIVE, takeovers: 1"],
+    );
     pair.all_are_in("INIT");
     pair.bench.show_simulator_lateness();
 }
@@ -126,8 +132,7 @@ fn a_stopped_active_is_off_before_the_other_takes_over_and_ends_when_it_goes_on(
     let (said, errors) = first.finish(LIMIT);
     assert!(said.contains("FAILED") && said.contains("the guard has switched both off"), "{said}{errors}");
     pair.all_are_in("OP");
-    let (said, errors) = second.interrupt();
-    assert!(said.contains("result: ok: stopped the bus as ACTIVE, takeovers: 1"), "{said}{errors}");
+    end(second, &["result: ok: stopped the bus as ACTIVE, takeovers: 1"]);
     pair.all_are_in("INIT");
     pair.bench.show_simulator_lateness();
 }
@@ -146,12 +151,10 @@ fn an_active_that_loses_all_its_cables_yields_and_follows_when_they_are_back() {
     pair.bench.set_link("main0", "up");
     await_words(&second, READY);
     pair.all_are_in("OP");
-    let (said, errors) = second.interrupt();
-    assert!(said.contains("result: ok: handed the role over, takeovers: 1"), "{said}{errors}");
+    end(second, &["result: ok: handed the role over, takeovers: 1"]);
     await_words(&first, "ACTIVE (handed over)");
     pair.all_are_in("OP");
-    let (said, errors) = first.interrupt();
-    assert!(said.contains("result: ok: stopped the bus as ACTIVE, takeovers: 1"), "{said}{errors}");
+    end(first, &["result: ok: stopped the bus as ACTIVE, takeovers: 1"]);
     pair.bench.show_simulator_lateness();
 }
 
@@ -174,12 +177,10 @@ fn of_two_controllers_that_each_have_half_the_ring_one_yields_when_it_is_mended(
     let (active, inactive) = if yields(&first) { (second, first) } else { (first, second) };
     await_op(&pair.bench, 10);
     assert!(!yields(&active), "{}", active.said().so_far());
-    let (said, errors) = inactive.interrupt();
-    assert!(said.contains("FAILED: collisions with another ACTIVE: "), "{said}{errors}");
+    end(inactive, &["FAILED: collisions with another ACTIVE: "]);
     await_op(&pair.bench, 10);
     // It may not have heard the other one, which yields in the cycle that shows the collision.
-    let (said, errors) = active.interrupt();
-    assert!(said.contains("stopped: outputs zero, all SubDevices in INIT"), "{said}{errors}");
+    end(active, &["stopped: outputs zero, all SubDevices in INIT"]);
     pair.all_are_in("INIT");
     pair.bench.show_simulator_lateness();
 }
@@ -233,8 +234,7 @@ fn controllers_with_a_network_file_print_json_and_name_a_difference_of_the_files
     let first = pair.first(&[]);
     await_words(&second, "ConfigurationDiffers");
     await_words(&first, "the other MainDevice has another configuration");
-    let (said, errors) = first.interrupt();
-    assert!(said.contains("FAILED: the other MainDevice differs: "), "{said}{errors}");
+    end(first, &["FAILED: the other MainDevice differs: "]);
     pair.all_are_in("OP");
     let (text, errors) = second.interrupt();
     let result = Page::read().check("standby", &text);
