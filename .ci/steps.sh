@@ -186,7 +186,7 @@ demo() {
     cargo run --release
     small ringcat 9700000 || too_large=1
     small ringcatd 6800000 || too_large=1
-    small ethercat 1800000 || too_large=1
+    small ethercat 1750000 || too_large=1
     return "$too_large"
 }
 
