@@ -44,6 +44,8 @@ pub struct Arguments {
     pub sim: Option<String>,
     /// `--follow`.
     pub follow: bool,
+    /// `--json`.
+    pub json: bool,
 }
 
 /// Options of the original tool: letter, name, and whether a value follows.
@@ -64,7 +66,8 @@ pub const OPTIONS: [(char, &str, bool); 12] = [
 
 /// Options of our own: name, and whether a value follows. An abbreviation means one of them only where it means none of
 /// [`OPTIONS`]: scripts for the original tool go on working.
-pub const OWN: [(&str, bool); 4] = [("main", true), ("redundant", true), ("sim", true), ("follow", false)];
+pub const OWN: [(&str, bool); 5] =
+    [("main", true), ("redundant", true), ("sim", true), ("follow", false), ("json", false)];
 
 impl Arguments {
     /// Reads the words of a command line, the name of the program left out.
@@ -148,6 +151,7 @@ impl Arguments {
                     "verbose" => &mut self.verbose,
                     "emergency" => &mut self.emergency,
                     "follow" => &mut self.follow,
+                    "json" => &mut self.json,
                     _ => &mut self.help,
                 };
                 *flag = true;
@@ -224,6 +228,21 @@ mod tests {
         }
         assert_eq!(parse("slaves --si a.toml").sim.as_deref(), Some("a.toml"));
         assert_eq!(parse("slaves --r=eth2").redundant.as_deref(), Some("eth2"));
+        assert!(parse("--js slaves").json && parse("slaves --j").json);
+    }
+
+    // covers: daemon
+    #[test]
+    fn no_option_of_our_own_changes_an_abbreviation_of_the_originals() {
+        for (_, name, has_value) in OPTIONS {
+            for length in 1..=name.len() {
+                let begin = &name[..length];
+                let is_alone = OPTIONS.iter().filter(|(_, other, _)| other.starts_with(begin)).count() == 1;
+                let is_own = OWN.iter().any(|(own, _)| *own == begin);
+                let wanted = (is_alone && !is_own).then_some((name, has_value));
+                assert!(is_own || find(begin) == wanted, "--{begin} is {:?}", find(begin));
+            }
+        }
     }
 
     // covers: daemon

@@ -1,5 +1,7 @@
 //! Data types of objects, registers and IDNs: values as users write and read them.
 
+use serde::Serialize;
+
 use crate::failure::Failure;
 use crate::hex;
 use crate::numbers;
@@ -28,6 +30,24 @@ pub struct DataType {
     /// Its bytes; 0 for any number.
     pub bytes: usize,
     kind: Kind,
+}
+
+/// A value as JSON has it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Scalar {
+    /// A number of `bool`, an unsigned type.
+    Unsigned(u64),
+    /// A number of a signed type.
+    Signed(i64),
+    /// A `float`; null where it is no finite number.
+    Float(f32),
+    /// A `double`; null where it is no finite number.
+    Double(f64),
+    /// A `string` in UTF-8.
+    Text(String),
+    /// Bytes, or a `string` that is not UTF-8.
+    Nothing,
 }
 
 const fn of(name: &'static str, code: u16, bytes: usize, kind: Kind) -> DataType {
@@ -90,11 +110,7 @@ impl DataType {
     /// # Errors
     /// The value has another size than the type.
     pub fn show(self, value: &[u8]) -> Result<Vec<u8>, Failure> {
-        if self.bytes != 0 && self.bytes != value.len() {
-            let (expected, got) = (self.bytes, value.len());
-            let text = format!("Data type mismatch. Expected {} with {expected} byte, but got {got} byte.", self.name);
-            return Err(Failure::failed(text));
-        }
+        self.check(value)?;
         let (bits, width) = (little_endian(value), 2 * self.bytes);
         Ok(match self.kind {
             Kind::Text => [value, b"\n"].concat(),
@@ -108,6 +124,33 @@ impl DataType {
             Kind::SignMagnitude => format!("0x{bits:0width$x} {}\n", self.sign_magnitude(bits)).into_bytes(),
             Kind::Bool | Kind::Unsigned | Kind::Signed | Kind::Raw => format!("{}\n", hex::listed(value)).into_bytes(),
         })
+    }
+
+    /// The value for JSON.
+    ///
+    /// # Errors
+    /// The value has another size than the type.
+    pub fn value(self, value: &[u8]) -> Result<Scalar, Failure> {
+        self.check(value)?;
+        let bits = little_endian(value);
+        Ok(match self.kind {
+            Kind::Bool | Kind::Unsigned => Scalar::Unsigned(bits),
+            Kind::Signed => Scalar::Signed(extended(bits, self.bytes)),
+            Kind::SignMagnitude => Scalar::Signed(self.sign_magnitude(bits)),
+            Kind::Float if self.bytes == 4 => Scalar::Float(f32::from_bits(bits as u32)),
+            Kind::Float => Scalar::Double(f64::from_bits(bits)),
+            Kind::Text => str::from_utf8(value).map_or(Scalar::Nothing, |text| Scalar::Text(text.to_owned())),
+            Kind::Octets | Kind::Unicode | Kind::Raw => Scalar::Nothing,
+        })
+    }
+
+    fn check(self, value: &[u8]) -> Result<(), Failure> {
+        if self.bytes == 0 || self.bytes == value.len() {
+            return Ok(());
+        }
+        let (expected, got) = (self.bytes, value.len());
+        let text = format!("Data type mismatch. Expected {} with {expected} byte, but got {got} byte.", self.name);
+        Err(Failure::failed(text))
     }
 
     fn float(self, bits: u64) -> f64 {
@@ -234,6 +277,31 @@ mod tests {
         }
         let failure = named("uint8").expect("it is a type").show(&[1, 2, 3, 4]).expect_err("it has another size");
         assert_eq!(failure.text(), "Data type mismatch. Expected uint8 with 1 byte, but got 4 byte.\n");
+    }
+
+    // covers: daemon
+    #[test]
+    fn values_are_numbers_or_text_in_json() {
+        for (name, value, json) in [
+            ("int32", &[5, 0, 0, 0x80][..], "-2147483643"),
+            ("sm16", &[5, 0x80], "-5"),
+            ("bool", &[1], "1"),
+            ("int24", &[0xFF; 3], "-1"),
+            ("uint24", &[0x11, 0x22, 0x33], "3351057"),
+            ("uint64", &[0xFF; 8], "18446744073709551615"),
+            ("float", &0.1_f32.to_le_bytes(), "0.1"),
+            ("float", &f32::NAN.to_le_bytes(), "null"),
+            ("double", &716.532_f64.to_le_bytes(), "716.532"),
+            ("string", b"a\"\x01", r#""a\"\u0001""#),
+            ("string", &[0xFF], "null"),
+            ("octet_string", b"ab", "null"),
+            ("unicode_string", b"a\0", "null"),
+            ("raw", &[1], "null"),
+        ] {
+            let value = named(name).expect("it is a type").value(value).expect("it has the size");
+            assert_eq!(serde_json::to_string(&value).expect("it is JSON"), json, "{name}");
+        }
+        assert!(named("uint8").expect("it is a type").value(&[1, 2]).is_err());
     }
 
     // covers: daemon

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use crate::commands::ALL;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// Options of all commands.
 pub const COMMON: &str = "  --master  -m <master>  Masters: comma-separated numbers and ranges, such
@@ -20,6 +20,10 @@ pub const STANDALONE: &str = "  --main <interface>       Drive the bus at this n
                            brought to PREOP, and stay there.
   --redundant <interface>  That at the other end of a ring.
   --sim <file>             Simulate this segment file instead.
+";
+
+/// The option of all commands that print data.
+pub const JSON: &str = "  --json                 Print JSON: one object per line.
 ";
 
 /// How numbers are written.
@@ -49,16 +53,22 @@ pub fn of(command: &Command) -> String {
         let _ = writeln!(text, "ethercat {} [OPTIONS]{}{form}", command.name, if form.is_empty() { "" } else { " " });
     }
     let _ = write!(text, "\n{}\n", command.summary);
-    for part in [command.help, command.options] {
-        if !part.is_empty() {
-            text.push('\n');
-        }
-        if std::ptr::eq(part, command.options) && !part.is_empty() {
-            text.push_str("Options of this command:\n");
-        }
-        text.push_str(part);
+    if !command.help.is_empty() {
+        text = text + "\n" + command.help;
+    }
+    let json = json_of(command);
+    if !command.options.is_empty() || !json.is_empty() {
+        text = text + "\nOptions of this command:\n" + command.options + json;
     }
     text + "\n" + NUMBERS
+}
+
+/// `--json`, where the command has it.
+pub fn json_of(command: &Command) -> &'static str {
+    match command.output {
+        Output::Data => JSON,
+        Output::Nothing => "",
+    }
 }
 
 #[cfg(test)]

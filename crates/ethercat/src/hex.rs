@@ -8,6 +8,18 @@ pub fn listed(bytes: &[u8]) -> String {
     all.join(" ")
 }
 
+/// `0102ab`.
+pub fn digits(bytes: &[u8]) -> String {
+    const DIGITS: &[u8; 16] = b"0123456789abcdef";
+    let digits = bytes.iter().flat_map(|byte| [byte >> 4, byte & 0x0F]);
+    digits.map(|digit| char::from(DIGITS[usize::from(digit)])).collect()
+}
+
+/// `02:00:00:00:00:01`.
+pub fn mac(address: &[u8; 6]) -> String {
+    address.map(|byte| format!("{byte:02x}")).join(":")
+}
+
 /// Lines of at most 16 bytes, each with `indent` before and a blank behind each byte, as in `domains` and `config`.
 pub fn lines(indent: &str, bytes: &[u8]) -> String {
     let mut text = String::new();
@@ -34,6 +46,7 @@ mod tests {
     #[test]
     fn bytes_are_listed_and_broken_into_lines() {
         assert_eq!((listed(&[1, 0xAB]), listed(&[])), ("0x01 0xab".to_owned(), String::new()));
+        assert_eq!((digits(&[1, 0xAB]), mac(&[2, 0, 0, 0, 0, 1])), ("01ab".to_owned(), "02:00:00:00:00:01".to_owned()));
         let bytes: Vec<u8> = (0..17).collect();
         let first = "  00 01 02 03 04 05 06 07 08 09 0a 0b 0c 0d 0e 0f";
         assert_eq!(lines("  ", &bytes), format!("{first} \n  10 \n"));

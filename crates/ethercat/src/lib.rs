@@ -7,7 +7,7 @@
 //! * [`standalone`]: a bus without a daemon, for one command;
 //! * [`session`]: the daemon and its masters; [`selection`]: SubDevices by alias and position;
 //! * [`data_types`]: values of objects, registers and IDNs; [`aborts`]: codes of refusals;
-//! * `command`: one file per command.
+//! * `command`: one file per command; `json`: what they print with `--json`.
 //!
 //! Data goes to the standard output, everything else to the standard error; the exit code is 0 or 1.
 #![forbid(unsafe_code)]
@@ -23,6 +23,7 @@ pub mod help;
 pub mod hex;
 pub mod inputs;
 pub mod ipv4;
+mod json;
 pub mod manual;
 pub mod numbers;
 pub mod options_help;
@@ -40,6 +41,7 @@ use arguments::Arguments;
 use commands::Found;
 use failure::Failure;
 use session::Session;
+use shape::Output;
 
 /// Runs the tool with these arguments, the name of the program left out, and the daemon at `socket`. False is exit
 /// code 1.
@@ -76,6 +78,10 @@ fn try_run(words: &[OsString], socket: &Path, output: &mut dyn Write, errors: &m
     if arguments.help {
         output.write_all(help::of(command).as_bytes())?;
         return Ok(());
+    }
+    if arguments.json && command.output == Output::Nothing {
+        let failure = Failure::usage(format!("'{}' prints no data: it has no --json!", command.name));
+        return Err(failure.with_help(|| help::of(command)));
     }
     let links = standalone::links(&arguments).map_err(wrong)?;
     let mut session = Session::new(command.name, arguments, socket, output, errors).with_links(links);

@@ -1,6 +1,6 @@
 //! Options as the help describes them, for completion and manual pages.
 
-use crate::help::{COMMON, STANDALONE};
+use crate::help::{COMMON, STANDALONE, json_of};
 use crate::shape::Command;
 
 /// An option in the help.
@@ -26,7 +26,9 @@ pub fn common() -> Vec<OptionHelp> {
 
 /// A command's own options.
 pub fn of(command: &Command) -> Vec<OptionHelp> {
-    options(command.options)
+    let mut all = options(command.options);
+    all.extend(options(json_of(command)));
+    all
 }
 
 /// A line with an option begins with two blanks and two minus signs; the lines behind it go on with its text.

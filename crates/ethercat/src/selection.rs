@@ -28,24 +28,34 @@ impl Slave {
         state(self.line.status.unwrap_or(0))
     }
 
+    /// Whether it reports an error or does not answer.
+    pub fn has_error(&self) -> bool {
+        self.line.status.is_none_or(|status| status & ERROR != 0)
+    }
+
     /// `E` where it reports an error or does not answer.
     pub fn flag(&self) -> char {
-        if self.line.status.is_some_and(|status| status & ERROR == 0) { '+' } else { 'E' }
+        if self.has_error() { 'E' } else { '+' }
     }
 }
 
 const ERROR: u16 = 0x10;
 
+/// The name of the state in an AL status; `None` for a number that is no state.
+pub fn state_name(status: u16) -> Option<&'static str> {
+    match status & 0x0F {
+        1 => Some("INIT"),
+        2 => Some("PREOP"),
+        3 => Some("BOOT"),
+        4 => Some("SAFEOP"),
+        8 => Some("OP"),
+        _ => None,
+    }
+}
+
 /// The text of an AL status.
 pub fn state(status: u16) -> String {
-    let name = match status & 0x0F {
-        1 => "INIT",
-        2 => "PREOP",
-        3 => "BOOT",
-        4 => "SAFEOP",
-        8 => "OP",
-        _ => "???",
-    };
+    let name = state_name(status).unwrap_or("???");
     let error = if status & ERROR == 0 { "" } else { "+ERROR" };
     format!("{name}{error}")
 }

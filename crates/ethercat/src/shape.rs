@@ -3,6 +3,16 @@
 use crate::failure::Failure;
 use crate::session::Session;
 
+/// What a command prints.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Output {
+    /// Data, which `--json` has too.
+    Data,
+    /// Nothing: it changes something.
+    Nothing,
+}
+
 /// A command.
 #[derive(Debug)]
 #[non_exhaustive]
@@ -17,6 +27,8 @@ pub struct Command {
     pub help: &'static str,
     /// Its own options, as in the help.
     pub options: &'static str,
+    /// What it prints.
+    pub output: Output,
     /// Runs it.
     pub run: fn(&mut Session<'_>) -> Result<(), Failure>,
 }

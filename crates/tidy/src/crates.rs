@@ -83,8 +83,15 @@ const RULES: &[CrateRule] = &[
     CrateRule {
         directory: "ethercat",
         // Its tests run it beside a daemon and an application.
-        internal: Internal::Only(&["ringcat", "ringcatd", "ringcat-control", "ringcat-engine", "ringcat-wire"]),
-        external: External::Only(&[]),
+        internal: Internal::Only(&[
+            "ringcat",
+            "ringcatd",
+            "ringcat-control",
+            "ringcat-engine",
+            "ringcat-keys",
+            "ringcat-wire",
+        ]),
+        external: External::Only(&["serde", "serde_json"]),
     },
     CrateRule {
         directory: "ffi",
@@ -95,8 +102,13 @@ const RULES: &[CrateRule] = &[
     CrateRule {
         directory: "cli",
         // Its tests run commands on the bus of a daemon.
-        internal: Internal::Only(&["ringcat", "ringcat-engine", "ringcat-link", "ringcatd"]),
+        internal: Internal::Only(&["ringcat", "ringcat-engine", "ringcat-keys", "ringcat-link", "ringcatd"]),
         external: External::Any,
+    },
+    CrateRule {
+        directory: "keys",
+        internal: Internal::Only(&[]),
+        external: External::Only(&["schemars", "serde_json"]),
     },
     CrateRule { directory: "scenarios", internal: Internal::Any, external: External::Any },
     CrateRule {

@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::numbers;
 use crate::selection_help::SELECTION;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// The command.
 pub const COMMAND: Command = Command {
@@ -20,6 +20,7 @@ it from its next start on. More than one slave needs --force, and so does an
 SII whose checksum is wrong before.
 ",
     options: SELECTION,
+    output: Output::Nothing,
     run,
 };
 

@@ -3,8 +3,10 @@
 use ringcat_control::message::ClockSnapshot;
 
 use crate::failure::Failure;
+use crate::json;
+use crate::json::ring::{Clock, Clocks};
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// The command.
 pub const COMMAND: Command = Command {
@@ -17,6 +19,7 @@ was locked, and its state. An application has to use the clocks. Not a
 command of IgH.
 ",
     options: "",
+    output: Output::Data,
     run,
 };
 
@@ -28,6 +31,10 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     for master in &masters {
         let number = master.master;
         let state = session.state(number)?;
+        if session.arguments.json {
+            json::print(session, &Clocks { master: number, clocks: state.clocks.iter().map(Clock::new).collect() })?;
+            continue;
+        }
         if masters.len() > 1 {
             writeln!(session, "Master{number}")?;
         }

@@ -4,9 +4,11 @@ use ringcat_control::tool::{DeclaredLine, MOST_DECLARED, Piece, ToolAnswer, Tool
 
 use super::config_details::details;
 use crate::failure::{Failure, unexpected};
+use crate::json;
+use crate::json::config::{Config, Declared};
 use crate::selection::{self, Slave};
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// The command.
 pub const COMMAND: Command = Command {
@@ -26,6 +28,7 @@ With --verbose everything that is configured.
     options: "  --alias    -a <alias>  Aliases of configurations.
   --position -p <pos>    Their positions; alone: those with alias 0.
 ",
+    output: Output::Data,
     run,
 };
 
@@ -38,10 +41,15 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     for master in masters {
         let number = master.master;
         let lines = selection::declared(declared(session, number)?, aliases.as_ref(), positions.as_ref());
+        let slaves = if lines.is_empty() { Vec::new() } else { session.all_slaves(number)? };
+        if session.arguments.json {
+            let declared = lines.iter().map(|line| Declared::new(line, &slaves)).collect();
+            json::print(session, &Config { master: number, declared })?;
+            continue;
+        }
         if lines.is_empty() {
             continue;
         }
-        let slaves = session.all_slaves(number)?;
         if is_several {
             writeln!(session, "Master{number}")?;
         }

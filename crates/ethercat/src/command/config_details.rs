@@ -93,7 +93,7 @@ fn flags(line: &DeclaredLine) -> String {
 }
 
 fn ip_parameters(ip: &IpParameters) -> String {
-    let mac = ip.mac.map(|mac| mac.map(|byte| format!("{byte:02x}")).join(":"));
+    let mac = ip.mac.map(|mac| hex::mac(&mac));
     let address = |address: Option<Ipv4Addr>| address.map(|it| it.to_string());
     let name = ip.name.as_ref().map(|name| String::from_utf8_lossy(name).into_owned());
     let lines = [

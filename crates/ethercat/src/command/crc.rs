@@ -4,9 +4,11 @@ use ringcat_control::message::Query;
 use ringcat_control::tool::{MOST_SUBDEVICES, Piece, PortLine, PortsLine, ToolAnswer, ToolQuery};
 
 use crate::failure::{Failure, unexpected};
+use crate::json;
+use crate::json::slaves::Crc;
 use crate::selection::Slave;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// Register RX_ERROR_COUNTER, where all counters begin.
 const COUNTERS: u16 = 0x0300;
@@ -29,6 +31,7 @@ pub const COMMAND: Command = Command {
 With 'reset' all counters of all slaves become zero.
 ",
     options: "",
+    output: Output::Data,
     run,
 };
 
@@ -38,6 +41,9 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         [word] if word == "reset" => true,
         _ => return Err(Failure::usage("'crc' takes either no or 'reset' argument!")),
     };
+    if is_reset && session.arguments.json {
+        return Err(Failure::usage("'crc reset' prints no data: it has no --json!"));
+    }
     let master = session.single_master()?;
     let slaves = session.all_slaves(master)?;
     if is_reset {
@@ -48,6 +54,9 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         return Ok(());
     }
     let ports = ports(session, master)?;
+    if session.arguments.json {
+        return json::print(session, &Crc::new(master, &slaves, |position| of_slave(&ports, position)));
+    }
     let text = table(&slaves, &ports);
     session.write(text.as_bytes())
 }
@@ -67,12 +76,17 @@ pub(super) fn ports(session: &mut Session<'_>, master: u32) -> Result<Vec<PortsL
     }
 }
 
+/// The ports of the SubDevice at a position; without links where they are not known.
+pub(super) fn of_slave(ports: &[PortsLine], position: u16) -> PortsLine {
+    ports.iter().find(|line| line.position == position).cloned().unwrap_or_default()
+}
+
 fn table(slaves: &[Slave], ports: &[PortsLine]) -> String {
     let mut text = "   |Port 0         |Port 1         |Port 2         |Port 3         |\n".to_owned();
     text += "   |CRC PHY FWD NXT|CRC PHY FWD NXT|CRC PHY FWD NXT|CRC PHY FWD NXT|\n";
     for slave in slaves {
         let position = slave.line.position;
-        let own = ports.iter().find(|line| line.position == position).cloned().unwrap_or_default();
+        let own = of_slave(ports, position);
         let cells: String = own.ports.iter().map(|port| cell(position, port) + "|").collect();
         let name: String = slave.line.name.chars().take(NAME).collect();
         text += &format!("{position:>3}|{cells}{name}\n");

@@ -4,10 +4,12 @@ use ringcat_control::tool::{Description, SyncManagerLine};
 
 use super::slaves::description;
 use crate::failure::Failure;
+use crate::json;
+use crate::json::texts::Text;
 use crate::selection::Slave;
 use crate::selection_help::SELECTION;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// Bit of a control byte: writes retrigger the watchdog.
 const WATCHDOG: u8 = 0x40;
@@ -25,14 +27,24 @@ pub const COMMAND: Command = Command {
 sync managers are left out.
 ",
     options: SELECTION,
+    output: Output::Data,
     run,
 };
 
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     for master in session.masters()? {
+        let mut whole = String::new();
         for slave in session.listed_slaves(master.master)? {
             let details = description(session, master.master, slave.line.position)?;
-            session.write(structures(master.master, &slave, &details).as_bytes())?;
+            let text = structures(master.master, &slave, &details);
+            if session.arguments.json {
+                whole += &text;
+            } else {
+                session.write(text.as_bytes())?;
+            }
+        }
+        if session.arguments.json {
+            json::print(session, &Text { master: master.master, text: &whole })?;
         }
     }
     Ok(())

@@ -5,7 +5,7 @@ use ringcat_control::tool::ToolQuery;
 use crate::failure::Failure;
 use crate::numbers;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// The command.
 pub const COMMAND: Command = Command {
@@ -16,6 +16,7 @@ pub const COMMAND: Command = Command {
 or 2 and above: also the content of all acyclic frames.
 ",
     options: "",
+    output: Output::Nothing,
     run,
 };
 

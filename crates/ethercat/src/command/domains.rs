@@ -5,8 +5,10 @@ use ringcat_control::tool::{DomainLine, ToolAnswer, ToolQuery};
 
 use crate::failure::{Failure, unexpected};
 use crate::hex;
+use crate::json;
+use crate::json::domains::{Domain, Domains, area_bytes};
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// The command.
 pub const COMMAND: Command = Command {
@@ -20,6 +22,7 @@ working counters of both follow in parentheses.
 With --verbose the process data of each slave configuration.
 ",
     options: "  --domain -d <index>  Domains; all by default.\n",
+    output: Output::Data,
     run,
 };
 
@@ -28,6 +31,11 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let (is_several, is_verbose) = (masters.len() > 1, session.arguments.verbose);
     for master in masters {
         let domains = selected(session, master.master)?;
+        if session.arguments.json {
+            let listed = domains.iter().map(|(number, domain, image)| Domain::new(*number, domain, image));
+            json::print(session, &Domains { master: master.master, domains: listed.collect() })?;
+            continue;
+        }
         if is_several && !domains.is_empty() {
             writeln!(session, "Master{}", master.master)?;
         }
@@ -76,9 +84,7 @@ fn areas(indent: &str, domain: &DomainLine, image: &[u8]) -> String {
         let direction = if area.is_output { "Output" } else { " Input" };
         text += &format!("{indent}  SlaveConfig {alias}:{position}, SM{} ({direction}), ", area.sync_manager);
         text += &format!("LogAddr 0x{:08x}, Size {}\n", area.logical, area.length);
-        let begin = area.offset as usize;
-        let bytes = image.get(begin..begin.saturating_add(area.length.into())).unwrap_or_default();
-        text += &hex::lines(&format!("{indent}    "), bytes);
+        text += &hex::lines(&format!("{indent}    "), area_bytes(area.offset, area.length, image));
     }
     text
 }

@@ -8,7 +8,7 @@ use crate::data_types::{self, DataType};
 use crate::failure::Failure;
 use crate::inputs;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// Most bytes of an object that is written.
 const MOST: usize = 64 << 10;
@@ -20,6 +20,7 @@ pub const COMMAND: Command = Command {
     forms: &["<INDEX> <SUBINDEX> <VALUE>", "<INDEX> <VALUE>"],
     help: super::upload::DOWNLOAD_HELP,
     options: super::upload::OPTIONS,
+    output: Output::Nothing,
     run,
 };
 

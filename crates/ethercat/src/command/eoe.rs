@@ -3,8 +3,10 @@
 use ringcat_control::tool::{EthernetLine, ToolAnswer, ToolQuery};
 
 use crate::failure::{Failure, unexpected};
+use crate::json;
+use crate::json::texts::{Ethernet, Interface};
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// The command.
 pub const COMMAND: Command = Command {
@@ -16,6 +18,7 @@ second of both directions (Tx: to the slave), and frames that wait to be
 sent. Without interfaces there is no output.
 ",
     options: "",
+    output: Output::Data,
     run,
 };
 
@@ -23,7 +26,10 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     for master in session.masters()? {
         let answer = session.tool(master.master, ToolQuery::Ethernet)?;
         let ToolAnswer::Ethernet(lines) = answer else { return Err(unexpected()) };
-        if !lines.is_empty() {
+        if session.arguments.json {
+            let interfaces = lines.iter().map(Interface::new).collect();
+            json::print(session, &Ethernet { master: master.master, interfaces })?;
+        } else if !lines.is_empty() {
             session.write(table(master.master, &lines).as_bytes())?;
         }
     }

@@ -5,8 +5,10 @@ use std::time::Duration;
 use ringcat_control::message::{Answer, EventLine, Query};
 
 use crate::failure::{Failure, unexpected};
+use crate::json;
+use crate::json::ring::Event;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// Interval of questions.
 const LOOK: Duration = Duration::from_millis(100);
@@ -23,6 +25,7 @@ number of its master. Not a command of IgH.
 ",
     options: "  --follow               Go on with events as they come, until Ctrl-C.
 ",
+    output: Output::Data,
     run,
 };
 
@@ -66,7 +69,12 @@ fn show(session: &mut Session<'_>, shown: &mut Shown, is_alone: bool) -> Result<
     if missed > 0 && shown.next > 0 {
         session.say(&format!("{missed} events came too fast to be shown"));
     }
-    for EventLine { at_ns, text, .. } in &events {
+    for event in &events {
+        if session.arguments.json {
+            json::print(session, &Event::new(master, event))?;
+            continue;
+        }
+        let EventLine { at_ns, text, .. } = event;
         let (seconds, micros) = (at_ns / 1_000_000_000, at_ns / 1_000 % 1_000_000);
         let of_master = if is_alone { String::new() } else { format!("{master}: ") };
         writeln!(session, "{of_master}[{seconds:5}.{micros:06}] {text}")?;

@@ -6,8 +6,11 @@ use ringcat_control::tool::ToolQuery;
 
 use crate::aborts::of_foe;
 use crate::failure::Failure;
+use crate::hex;
+use crate::json;
+use crate::json::reads::File;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// The command.
 pub const COMMAND: Command = Command {
@@ -22,20 +25,28 @@ slave. Its content goes to the standard output, or to a file; at most
   --alias       -a <alias>  Alias of the slave.
   --position    -p <pos>    Its position. See the help of 'slaves'.
 ",
+    output: Output::Data,
     run,
 };
 
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let [name] = session.words() else { return Err(Failure::usage("'foe_read' takes one argument: the file!")) };
-    let name = name.clone();
+    let file = name.clone();
     let (master, position) = session.single_slave()?;
-    let asked = session.done(master, ToolQuery::FileRead { position, name }, Vec::new());
+    let asked = session.done(master, ToolQuery::FileRead { position, name: file.clone() }, Vec::new());
     let bytes = asked.map_err(|failure| of_foe(failure, "read"))?;
     session.say_if_verbose(&format!("Read {} bytes of FoE data.", bytes.len()));
-    match session.arguments.output_file.clone().filter(|file| file != "-") {
-        Some(file) => {
-            fs::write(&file, bytes).map_err(|error| Failure::failed(format!("Failed to open '{file}'! ({error})")))
+    let local = session.arguments.output_file.clone().filter(|file| file != "-");
+    if let Some(local) = &local {
+        let written = fs::write(local, &bytes);
+        written.map_err(|error| Failure::failed(format!("Failed to open '{local}'! ({error})")))?;
+    }
+    match local {
+        _ if session.arguments.json => {
+            let data = local.is_none().then(|| hex::digits(&bytes));
+            json::print(session, &File { master, position, file: &file, length_bytes: bytes.len(), data })
         }
+        Some(_) => Ok(()),
         None => session.write(&bytes),
     }
 }

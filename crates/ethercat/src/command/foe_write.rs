@@ -10,7 +10,7 @@ use crate::aborts::of_foe;
 use crate::failure::Failure;
 use crate::inputs;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// The command.
 pub const COMMAND: Command = Command {
@@ -25,6 +25,7 @@ pub const COMMAND: Command = Command {
   --alias       -a <alias>  Alias of the slave.
   --position    -p <pos>    Its position. See the help of 'slaves'.
 ",
+    output: Output::Nothing,
     run,
 };
 

@@ -5,9 +5,11 @@ use ringcat_control::tool::{ClockFeatures, PortLine, PortsLine};
 use super::crc::ports;
 use super::slaves::{description, has_clock};
 use crate::failure::Failure;
+use crate::json;
+use crate::json::texts::Text;
 use crate::selection::Slave;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// Kind of a port: EBUS, MII.
 const EBUS: u8 = 2;
@@ -31,6 +33,7 @@ pub const COMMAND: Command = Command {
 INFO adds to the graph: 'DC' clocks and delays, 'CRC' error counters.
 ",
     options: "",
+    output: Output::Data,
     run,
 };
 
@@ -54,6 +57,9 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         }
     }
     let text = graph(&slaves, &ports, &clocks, more);
+    if session.arguments.json {
+        return json::print(session, &Text { master, text: &text });
+    }
     session.write(text.as_bytes())
 }
 

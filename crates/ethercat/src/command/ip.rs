@@ -5,7 +5,7 @@ use ringcat_control::tool::{IpParameters, ToolQuery};
 use crate::failure::Failure;
 use crate::ipv4;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// Longest host name.
 const LONGEST_NAME: usize = 32;
@@ -24,6 +24,7 @@ pub const COMMAND: Command = Command {
 Instead of an IPv4 address a host name can be given.
 ",
     options: super::reg_read::SINGLE,
+    output: Output::Nothing,
     run,
 };
 

@@ -3,14 +3,18 @@
 use std::fs;
 
 use ringcat_control::client::ClientError;
-use ringcat_control::message::MasterState;
 use ringcat_control::refusal::Refusal;
-use ringcat_control::tool::{LinkReport, MasterReport, ToolAnswer, ToolQuery, Traffic, TrafficRate};
+use ringcat_control::tool::{ToolAnswer, ToolQuery};
 
 use crate::failure::{Failure, unexpected};
+use crate::json;
+use crate::json::master::{Device, Frames, Master, Phase, Rate};
+use crate::json::values::Link;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
+/// Titles of the links.
+const TITLES: [&str; 2] = ["Main", "Backup"];
 /// Bytes of a KByte.
 const KILO: f64 = 1024.0;
 /// Seconds of a day.
@@ -28,6 +32,7 @@ and 60 seconds, distributed clocks. A frame counts as received on the
 device that sent it.
 ",
     options: "",
+    output: Output::Data,
     run,
 };
 
@@ -40,7 +45,12 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
             Err(Failure::Asked(ClientError::Refused(Refusal::Fault { .. }))) => None,
             Err(failure) => return Err(failure),
         };
-        session.write(text(&master, report.as_deref(), transmit_errors).as_bytes())?;
+        let known = Master::new(master.master, interfaces(&master.links), report.as_deref(), transmit_errors);
+        if session.arguments.json {
+            json::print(session, &known)?;
+        } else {
+            session.write(text(&known).as_bytes())?;
+        }
     }
     Ok(())
 }
@@ -58,104 +68,72 @@ fn transmit_errors(interface: &str) -> u64 {
     text.trim().parse().unwrap_or(0)
 }
 
-fn text(master: &MasterState, report: Option<&MasterReport>, errors: impl Fn(&str) -> u64) -> String {
-    let names = interfaces(&master.links);
+fn text(master: &Master<'_>) -> String {
     let mut text = format!("Master{}\n", master.master);
-    let waiting = MasterReport { is_orphaned: true, ..MasterReport::default() };
-    let known = report.unwrap_or(&waiting);
-    let phase = match (known.is_active, known.is_orphaned) {
-        (true, _) => "Operation",
-        (false, true) => "Waiting for device(s)...",
-        (false, false) => "Idle",
+    let phase = match master.phase {
+        Phase::Operation => "Operation",
+        Phase::Waiting => "Waiting for device(s)...",
+        Phase::Idle => "Idle",
     };
-    let active = if known.is_active { "yes" } else { "no" };
-    text += &format!("  Phase: {phase}\n  Active: {active}\n  Slaves: {}\n  Ethernet devices:\n", known.subdevices);
-    let titles = ["Main", "Backup"];
-    if report.is_none() {
-        for (title, name) in titles.iter().zip(&names) {
+    let active = if master.active { "yes" } else { "no" };
+    text += &format!("  Phase: {phase}\n  Active: {active}\n  Slaves: {}\n  Ethernet devices:\n", master.subdevices);
+    let Some(all) = &master.common else {
+        for (title, name) in TITLES.iter().zip(&master.awaited_interfaces) {
             text += &format!("    {title}: {name} (waiting...)\n");
         }
         return text;
-    }
-    for (at, link) in known.links.iter().enumerate() {
-        text += &device(titles[at.min(1)], link, names.get(at).map_or(0, |name| errors(name)));
-    }
-    let all: Vec<&Traffic> = known.links.iter().map(|link| &link.traffic).collect();
-    text + &common(&sum(&all)) + &clocks(known)
+    };
+    master.devices.iter().for_each(|link| text += &device(link));
+    text + &common(all) + &clocks(master)
 }
 
-fn device(title: &str, link: &LinkReport, errors: u64) -> String {
-    let mac = link.mac.map(|byte| format!("{byte:02x}")).join(":");
+fn device(link: &Device) -> String {
+    let title = TITLES[usize::from(link.link == Link::Redundant)];
     let state = if link.carrier == Some(false) { "DOWN" } else { "UP" };
-    let mut text = format!("    {title}: {mac} (attached)\n      Link: {state}\n");
-    text += &counters(&link.traffic);
-    text += &format!("      Tx errors:   {errors}\n");
-    text + &rates(&link.traffic)
+    let mut text = format!("    {title}: {} (attached)\n      Link: {state}\n", link.mac_address);
+    text += &counters(&link.frames);
+    text += &format!("      Tx errors:   {}\n", link.send_errors);
+    text + &rates(&link.frames)
 }
 
-fn counters(traffic: &Traffic) -> String {
-    let (received, received_bytes) = (traffic.frames.saturating_sub(traffic.lost), received_bytes(traffic));
+fn counters(frames: &Frames) -> String {
     format!(
-        "      Tx frames:   {}\n      Tx bytes:    {}\n{}",
-        traffic.frames,
-        traffic.bytes,
-        format_args!("      Rx frames:   {received}\n      Rx bytes:    {received_bytes}\n")
+        "      Tx frames:   {}\n      Tx bytes:    {}\n      Rx frames:   {}\n      Rx bytes:    {}\n",
+        frames.sent_frames, frames.sent_bytes, frames.received_frames, frames.received_bytes
     )
 }
 
-fn received_bytes(traffic: &Traffic) -> u64 {
-    traffic.bytes.saturating_sub(traffic.lost_bytes)
-}
-
-fn common(all: &Traffic) -> String {
+fn common(all: &Frames) -> String {
     let mut text = "    Common:\n".to_owned() + &counters(all);
-    text += &format!("      Lost frames: {}\n", all.lost);
+    text += &format!("      Lost frames: {}\n", all.lost_frames);
     text += &rates(all);
-    text += &row("Loss rate [1/s]:", all, |rate| format!("{:.0}", rate.lost_per_s));
+    text += &row("Loss rate [1/s]:", all, |rate| format!("{:.0}", rate.lost_frames_per_s));
     text + &row("Frame loss [%]:", all, |rate| {
-        let share = if rate.frames_per_s > 0.0 { rate.lost_per_s / rate.frames_per_s } else { 0.0 };
+        let share = if rate.sent_frames_per_s > 0.0 { rate.lost_frames_per_s / rate.sent_frames_per_s } else { 0.0 };
         format!("{:.1}", 100.0 * share.min(1.0))
     })
 }
 
-fn rates(traffic: &Traffic) -> String {
+fn rates(frames: &Frames) -> String {
     let number = |value: f64| format!("{:.0}", value.max(0.0));
     let kilobytes = |value: f64| format!("{:.1}", value.max(0.0) / KILO);
-    row("Tx frame rate [1/s]:", traffic, |rate| number(rate.frames_per_s))
-        + &row("Tx rate [KByte/s]:", traffic, |rate| kilobytes(rate.bytes_per_s))
-        + &row("Rx frame rate [1/s]:", traffic, |rate| number(rate.frames_per_s - rate.lost_per_s))
-        + &row("Rx rate [KByte/s]:", traffic, |rate| kilobytes(rate.bytes_per_s - rate.lost_bytes_per_s))
+    row("Tx frame rate [1/s]:", frames, |rate| number(rate.sent_frames_per_s))
+        + &row("Tx rate [KByte/s]:", frames, |rate| kilobytes(rate.sent_bytes_per_s))
+        + &row("Rx frame rate [1/s]:", frames, |rate| number(rate.received_frames_per_s))
+        + &row("Rx rate [KByte/s]:", frames, |rate| kilobytes(rate.received_bytes_per_s))
 }
 
-fn row(title: &str, traffic: &Traffic, value: impl Fn(&TrafficRate) -> String) -> String {
-    let values = traffic.rates.each_ref().map(|rate| format!(" {:>6}", value(rate)));
+fn row(title: &str, frames: &Frames, value: impl Fn(&Rate) -> String) -> String {
+    let values = frames.rates.each_ref().map(|rate| format!(" {:>6}", value(rate)));
     format!("      {title:<20}{}\n", values.concat())
 }
 
-/// The traffic of all links together.
-fn sum(all: &[&Traffic]) -> Traffic {
-    let mut sum = Traffic::default();
-    for one in all {
-        sum.frames += one.frames;
-        sum.bytes += one.bytes;
-        sum.lost += one.lost;
-        sum.lost_bytes += one.lost_bytes;
-        for (sum, one) in sum.rates.iter_mut().zip(&one.rates) {
-            sum.frames_per_s += one.frames_per_s;
-            sum.bytes_per_s += one.bytes_per_s;
-            sum.lost_per_s += one.lost_per_s;
-            sum.lost_bytes_per_s += one.lost_bytes_per_s;
-        }
-    }
-    sum
-}
-
-fn clocks(report: &MasterReport) -> String {
-    let reference = report.reference.map_or("None".to_owned(), |position| format!("Slave {position}"));
+fn clocks(master: &Master<'_>) -> String {
+    let reference = master.reference_clock.map_or("None".to_owned(), |position| format!("Slave {position}"));
     let mut text = format!("  Distributed clocks:\n    Reference clock:   {reference}\n");
-    text += &format!("    DC reference time: {}\n", report.reference_time_ns);
-    text += &format!("    Application time:  {}\n", report.application_time_ns);
-    text + &format!("                       {}\n", date(report.application_time_ns))
+    text += &format!("    DC reference time: {}\n", master.reference_time_ns);
+    text += &format!("    Application time:  {}\n", master.application_time_ns);
+    text + &format!("                       {}\n", date(master.application_time_ns))
 }
 
 /// Date and time in UTC of nanoseconds since 2000-01-01.
@@ -182,6 +160,7 @@ fn civil(days: u64) -> (u64, u64, u64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ringcat_control::tool::{LinkReport, MasterReport, Traffic, TrafficRate};
 
     // covers: daemon
     #[test]
@@ -199,8 +178,8 @@ mod tests {
         let traffic = Traffic { frames: 9477, bytes: 568_620, lost: 7, lost_bytes: 420, rates: [rate; 3] };
         let link = LinkReport { mac: [0, 0x1B, 0x21, 0xAB, 0xCD, 0xEF], carrier: None, traffic };
         let report = MasterReport { links: vec![link.clone(), link], reference: Some(3), ..MasterReport::default() };
-        let master = MasterState { master: 0, links: "eth1,eth2".to_owned(), owner: None, fault: None };
-        let text = text(&master, Some(&report), |name| if name == "eth2" { 5 } else { 0 });
+        let errors = |name: &str| if name == "eth2" { 5 } else { 0 };
+        let text = text(&Master::new(0, interfaces("eth1,eth2"), Some(&report), errors));
         for part in [
             "  Phase: Idle\n  Active: no\n  Slaves: 0\n  Ethernet devices:\n    Main: 00:1b:21:ab:cd:ef (attached)\n",
             "    Backup: 00:1b:21:ab:cd:ef (attached)\n      Link: UP\n      Tx frames:   9477\n",
@@ -218,9 +197,8 @@ mod tests {
     // covers: daemon
     #[test]
     fn a_master_without_its_interface_waits_for_it() {
-        let master = MasterState { master: 1, links: "eth1,eth2".to_owned(), owner: None, fault: None };
         let wanted = "Master1\n  Phase: Waiting for device(s)...\n  Active: no\n  Slaves: 0\n  Ethernet devices:\n    \
                       Main: eth1 (waiting...)\n    Backup: eth2 (waiting...)\n";
-        assert_eq!(text(&master, None, |_| 0), wanted);
+        assert_eq!(text(&Master::new(1, interfaces("eth1,eth2"), None, |_| 0)), wanted);
     }
 }

@@ -5,8 +5,11 @@ use ringcat_control::tool::{Description, SyncManagerLine};
 use super::matlab;
 use super::slaves::description;
 use crate::failure::Failure;
+use crate::json;
+use crate::json::pdos::{Pdos, SubDevice};
+use crate::selection::Slave;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// The command.
 pub const COMMAND: Command = Command {
@@ -20,6 +23,7 @@ their entries. Skin 'etherlab' prints a MATLAB function instead.
   --position -p <pos>    Their positions. See the help of 'slaves'.
   --skin     -s <skin>   'default' or 'etherlab'.
 ",
+    output: Output::Data,
     run,
 };
 
@@ -29,11 +33,18 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         Some("etherlab") => true,
         Some(other) => return Err(Failure::usage(format!("Invalid skin '{other}'!"))),
     };
+    if is_matlab && session.arguments.json {
+        return Err(Failure::usage("Skin 'etherlab' has no --json!"));
+    }
     let masters = session.masters()?;
     let is_several = masters.len() > 1;
     for master in masters {
         let number = master.master;
         let slaves = session.listed_slaves(number)?;
+        if session.arguments.json {
+            print_json(session, number, &slaves)?;
+            continue;
+        }
         let has_header = is_several || slaves.len() > 1;
         for slave in slaves {
             let details = description(session, number, slave.line.position)?;
@@ -51,6 +62,17 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         }
     }
     Ok(())
+}
+
+fn print_json(session: &mut Session<'_>, master: u32, slaves: &[Slave]) -> Result<(), Failure> {
+    let mut all = Vec::new();
+    for slave in slaves {
+        let position = slave.line.position;
+        all.push((position, description(session, master, position)?));
+    }
+    let has_any = |(_, details): &&(u16, Description)| !details.sync_managers.is_empty();
+    let listed = all.iter().filter(has_any).map(|(position, details)| SubDevice::new(*position, details));
+    json::print(session, &Pdos { master, subdevices: listed.collect() })
 }
 
 fn listed(details: &Description) -> String {

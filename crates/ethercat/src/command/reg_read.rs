@@ -5,9 +5,11 @@ use ringcat_control::message::Query;
 use crate::data_types;
 use crate::failure::Failure;
 use crate::hex;
+use crate::json;
+use crate::json::reads::{Registers, Value};
 use crate::numbers;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// Bytes that one question reads.
 const PIECE: u32 = 1024;
@@ -36,6 +38,7 @@ Data types for --type:
   sm8, sm16, sm32, sm64 (sign and magnitude).
 ",
     options: TYPED,
+    output: Output::Data,
     run,
 };
 
@@ -70,6 +73,10 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         let ask = Query::RegisterRead { position, address: at as u16, length: piece as u16 };
         bytes.extend(session.ask(master, ask, Vec::new())?.1);
         at += piece;
+    }
+    if session.arguments.json {
+        let Value { data_type, value, data } = Value::new(data_type, &bytes)?;
+        return json::print(session, &Registers { master, position, address, data_type, value, data });
     }
     match data_type {
         Some(data_type) => session.write(&data_type.show(&bytes)?),

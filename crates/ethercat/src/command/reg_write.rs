@@ -9,7 +9,7 @@ use crate::data_types;
 use crate::failure::Failure;
 use crate::inputs;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// Most bytes that one question writes.
 const PIECE: usize = 1024;
@@ -39,6 +39,7 @@ Data types for --type:
   --type      -t <type>   Data type.
   --emergency -e          Before everything else.
 ",
+    output: Output::Nothing,
     run,
 };
 

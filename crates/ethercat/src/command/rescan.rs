@@ -4,7 +4,7 @@ use ringcat_control::message::Query;
 
 use crate::failure::Failure;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// The command.
 pub const COMMAND: Command = Command {
@@ -13,6 +13,7 @@ pub const COMMAND: Command = Command {
     forms: &[""],
     help: "Slaves that did not change keep their states. Ends when the scan has ended.\n",
     options: "",
+    output: Output::Nothing,
     run,
 };
 

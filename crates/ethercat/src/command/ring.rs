@@ -4,8 +4,10 @@ use ringcat_control::message::{Answer, CableSnapshot, Query, Snapshot};
 use ringcat_control::tool::{ToolAnswer, ToolQuery};
 
 use crate::failure::{Failure, unexpected};
+use crate::json;
+use crate::json::ring::Ring;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// The command.
 pub const COMMAND: Command = Command {
@@ -17,6 +19,7 @@ then damaged frames and lost links are counted at both ends of each cable.
 Not a command of IgH.
 ",
     options: "",
+    output: Output::Data,
     run,
 };
 
@@ -32,6 +35,10 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
             return Err(unexpected());
         };
         let ToolAnswer::Master(report) = session.tool(number, ToolQuery::Master)? else { return Err(unexpected()) };
+        if session.arguments.json {
+            json::print(session, &Ring::new(number, &state, seen.counts, report.links.len()))?;
+            continue;
+        }
         if masters.len() > 1 {
             writeln!(session, "Master{number}")?;
         }

@@ -1,13 +1,15 @@
 //! `sdos`: the dictionaries of SubDevices.
 
-use ringcat_control::tool::{EntryLine, ToolAnswer, ToolQuery};
+use ringcat_control::tool::{EntryLine, ObjectLine, ToolAnswer, ToolQuery};
 use ringcat_wire::sii::MailboxProtocols;
 
 use super::slaves::description;
 use crate::data_types;
 use crate::failure::{Failure, unexpected};
+use crate::json;
+use crate::json::sdos::{Object, Sdos};
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// Bit of CoE details: SDO information.
 const INFORMATION: u8 = 2;
@@ -30,6 +32,7 @@ only the objects. Slaves without SDO information have no lines.
   --position -p <pos>    Their positions. See the help of 'slaves'.
   --quiet    -q          Objects only.
 ",
+    output: Output::Data,
     run,
 };
 
@@ -42,16 +45,23 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         let has_header = is_several || slaves.len() > 1;
         for slave in slaves {
             let position = slave.line.position;
+            if session.arguments.json {
+                print_json(session, number, position)?;
+                continue;
+            }
             if has_header {
                 writeln!(session, "=== Master {number}, Slave {position} ===")?;
             }
-            dictionary(session, number, position)?;
+            for_each(session, number, position, &mut |session, index, object| text(session, index, &object))?;
         }
     }
     Ok(())
 }
 
-fn dictionary(session: &mut Session<'_>, master: u32, position: u16) -> Result<(), Failure> {
+/// What is done with an object and its index.
+type Act<'f, 's> = dyn FnMut(&mut Session<'s>, u16, ObjectLine) -> Result<(), Failure> + 'f;
+
+fn for_each<'s>(session: &mut Session<'s>, master: u32, position: u16, act: &mut Act<'_, 's>) -> Result<(), Failure> {
     let details = description(session, master, position)?;
     let has_objects = details.protocols & MailboxProtocols::COE != 0 && details.coe & INFORMATION != 0;
     if !has_objects {
@@ -68,15 +78,28 @@ fn dictionary(session: &mut Session<'_>, master: u32, position: u16) -> Result<(
             Err(failure) if failure.aborted().is_some() => continue,
             Err(failure) => return Err(failure),
         };
-        writeln!(session, "SDO 0x{index:04x}, \"{}\"", printable(&object.name))?;
-        if session.arguments.quiet {
-            continue;
-        }
-        for entry in &object.entries {
-            session.write(line(index, entry).as_bytes())?;
-        }
+        act(session, index, object)?;
     }
     Ok(())
+}
+
+fn text(session: &mut Session<'_>, index: u16, object: &ObjectLine) -> Result<(), Failure> {
+    writeln!(session, "SDO 0x{index:04x}, \"{}\"", printable(&object.name))?;
+    if session.arguments.quiet {
+        return Ok(());
+    }
+    object.entries.iter().try_for_each(|entry| session.write(line(index, entry).as_bytes()))
+}
+
+fn print_json(session: &mut Session<'_>, master: u32, position: u16) -> Result<(), Failure> {
+    let mut all: Vec<(u16, ObjectLine)> = Vec::new();
+    for_each(session, master, position, &mut |_, index, object| {
+        all.push((index, object));
+        Ok(())
+    })?;
+    let has_entries = !session.arguments.quiet;
+    let objects = all.iter().map(|(index, object)| Object::new(*index, object, has_entries)).collect();
+    json::print(session, &Sdos { master, position, objects })
 }
 
 /// A name of a dictionary, which holds what the SubDevice sends: one line, and nothing that a terminal obeys.

@@ -2,11 +2,13 @@
 
 use ringcat_control::message::Query;
 
-use super::sii_image::{HEAD_WORDS, categories, category_name};
+use super::sii_image::{self, HEAD_WORDS, categories, category_name};
 use crate::failure::Failure;
 use crate::hex;
+use crate::json;
+use crate::json::reads::{Category, Sii};
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// The command.
 pub const COMMAND: Command = Command {
@@ -17,16 +19,23 @@ pub const COMMAND: Command = Command {
 with --verbose as text, category by category.
 ",
     options: super::reg_read::SINGLE,
+    output: Output::Data,
     run,
 };
 
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let (master, position) = session.single_slave()?;
     let (_, image) = session.ask(master, Query::SiiRead { position }, Vec::new())?;
+    let corrupted = || Failure::failed("SII data seem to be corrupted!");
+    if session.arguments.json {
+        let found = categories(&image);
+        let is_refused = session.arguments.verbose && found.is_none();
+        json::print(session, &sii(master, position, &image, found))?;
+        return if is_refused { Err(corrupted()) } else { Ok(()) };
+    }
     if !session.arguments.verbose {
         return session.write(&image);
     }
-    let corrupted = || Failure::failed("SII data seem to be corrupted!");
     let head = image.get(..2 * HEAD_WORDS).ok_or_else(corrupted)?;
     let mut text = "SII Area:\n".to_owned() + &hex::trimmed_lines("  ", head);
     let Some(categories) = categories(&image) else {
@@ -38,4 +47,13 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         text += &hex::trimmed_lines("  ", data);
     }
     session.write(text.as_bytes())
+}
+
+fn sii(master: u32, position: u16, image: &[u8], categories: Option<Vec<sii_image::Category<'_>>>) -> Sii {
+    let category = |(category, data): (u16, &[u8])| {
+        let (name, data) = (category_name(category), hex::digits(data));
+        Category { category, name, data }
+    };
+    let categories = categories.map(|found| found.into_iter().map(category).collect());
+    Sii { master, position, length_bytes: image.len(), categories, data: hex::digits(image) }
 }

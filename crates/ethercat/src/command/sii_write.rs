@@ -6,7 +6,7 @@ use super::sii_image::{FEWEST_WORDS, HEAD_WORDS, categories, wrong_checksum};
 use crate::failure::Failure;
 use crate::inputs;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// Most bytes of an image.
 const MOST: usize = 64 << 10;
@@ -22,6 +22,7 @@ categories up to their end; --force writes anyway what may make the slave
 unusable. The slave uses the new contents from its next start on.
 ",
     options: super::reg_read::SINGLE,
+    output: Output::Nothing,
     run,
 };
 

@@ -2,25 +2,11 @@
 
 use ringcat_control::tool::{ClockFeatures, Description, PortLine, PortsLine};
 
+use crate::json::details::{COE_DETAILS, Clock, FLAGS, PORT_KINDS, protocols};
 use crate::selection::Slave;
 
-/// Kinds of ports.
-const KINDS: [&str; 4] = ["N/A", "N/C", "EBUS", "MII"];
-/// Mailbox protocols by bit.
-const PROTOCOLS: [&str; 6] = ["AoE", "EoE", "CoE", "FoE", "SoE", "VoE"];
 /// Bit of CoE.
 const COE: u16 = 4;
-/// CoE details by bit.
-const COE_DETAILS: [&str; 6] = [
-    "Enable SDO",
-    "Enable SDO Info",
-    "Enable PDO Assign",
-    "Enable PDO Configuration",
-    "Enable Upload at startup",
-    "Enable SDO complete access",
-];
-/// Flags by bit.
-const FLAGS: [&str; 2] = ["Enable SafeOp", "Enable notLRW"];
 
 /// The block of one SubDevice.
 pub fn details(master: u32, slave: &Slave, details: &Description, has_clock: bool, ports: &PortsLine) -> String {
@@ -48,11 +34,11 @@ fn yes(is: bool) -> &'static str {
 }
 
 fn data_link(features: &ClockFeatures, has_clock: bool, ports: &PortsLine) -> String {
-    let clock = match (features.dc, has_clock, features.dc_64) {
-        (false, ..) => "no",
-        (true, false, _) => "yes, delay measurement only",
-        (true, true, true) => "yes, 64 bit",
-        (true, true, false) => "yes, 32 bit",
+    let clock = match Clock::of(features, has_clock) {
+        Clock::None => "no",
+        Clock::Delays => "yes, delay measurement only",
+        Clock::Bits64 => "yes, 64 bit",
+        Clock::Bits32 => "yes, 32 bit",
     };
     let mut text = format!("DL information:\n  FMMU bit operation: {}\n", yes(features.fmmu_bytes));
     text += &format!("  Distributed clocks: {clock}\n");
@@ -83,13 +69,12 @@ fn port_row(number: usize, port: &PortLine) -> String {
     let [link, is_closed, signal] = port.link;
     let (link, closed) = (if link { "up" } else { "down" }, if is_closed { "closed" } else { "open" });
     let next = port.neighbour.map_or("-".to_owned(), |position| position.to_string());
-    let kind = KINDS.get(usize::from(port.kind)).unwrap_or(&"???");
+    let kind = PORT_KINDS.get(usize::from(port.kind)).unwrap_or(&"???");
     format!("{number:>4}  {kind:<4}  {link:<4}  {closed:<6}  {:<6}  {next:>9}", yes(signal))
 }
 
 fn mailboxes(details: &Description) -> String {
-    let names = (0..).zip(PROTOCOLS).filter(|(bit, _)| details.protocols >> bit & 1 != 0).map(|(_, name)| name);
-    let names: Vec<&str> = names.collect();
+    let names = protocols(details);
     if names.is_empty() {
         return String::new();
     }

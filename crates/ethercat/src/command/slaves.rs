@@ -3,14 +3,17 @@
 use ringcat_control::client::ClientError;
 use ringcat_control::message::Query;
 use ringcat_control::refusal::Refusal;
-use ringcat_control::tool::{Description, ToolAnswer, ToolQuery};
+use ringcat_control::tool::{Description, PortsLine, ToolAnswer, ToolQuery};
 
-use super::crc::ports;
+use super::crc::{of_slave, ports};
 use super::slave_details::details;
 use crate::failure::{Failure, unexpected};
+use crate::json;
+use crate::json::details::Details;
+use crate::json::slaves::{Slaves, SubDevice};
 use crate::selection::Slave;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// Register SYSTEM_TIME.
 const SYSTEM_TIME: u16 = 0x0910;
@@ -43,6 +46,7 @@ Slave selection:
 Both take comma-separated numbers and ranges, such as '1,3', '5-7', '-3'.
 ",
     options: crate::selection_help::SELECTION,
+    output: Output::Data,
     run,
 };
 
@@ -52,17 +56,15 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     for master in masters {
         let number = master.master;
         let slaves = session.listed_slaves(number)?;
+        if session.arguments.json {
+            print_json(session, number, &slaves)?;
+            continue;
+        }
         if session.arguments.verbose {
-            if slaves.is_empty() {
-                continue;
-            }
-            let ports = ports(session, number)?;
+            let ports = if slaves.is_empty() { Vec::new() } else { ports(session, number)? };
             for slave in &slaves {
-                let position = slave.line.position;
-                let own = ports.iter().find(|line| line.position == position).cloned().unwrap_or_default();
-                let description = description(session, number, position)?;
-                let has_clock = has_clock(session, number, position, &description)?;
-                session.write(details(number, slave, &description, has_clock, &own).as_bytes())?;
+                let known = known(session, number, slave, &ports)?;
+                session.write(details(number, slave, &known.description, known.has_clock, &known.ports).as_bytes())?;
             }
             continue;
         }
@@ -73,6 +75,36 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         session.write(table(indent, &slaves).as_bytes())?;
     }
     Ok(())
+}
+
+fn print_json(session: &mut Session<'_>, master: u32, slaves: &[Slave]) -> Result<(), Failure> {
+    let mut all = Vec::new();
+    if session.arguments.verbose && !slaves.is_empty() {
+        let ports = ports(session, master)?;
+        for slave in slaves {
+            all.push(known(session, master, slave, &ports)?);
+        }
+    }
+    let of = |(at, slave)| {
+        let known: Option<&Known> = all.get(at);
+        SubDevice::new(slave, known.map(|it| Details::new(&it.description, it.has_clock, &it.ports)))
+    };
+    let subdevices = slaves.iter().enumerate().map(of).collect();
+    json::print(session, &Slaves { master, subdevices })
+}
+
+/// What is known of a SubDevice beside its line.
+struct Known {
+    description: Description,
+    has_clock: bool,
+    ports: PortsLine,
+}
+
+fn known(session: &mut Session<'_>, master: u32, slave: &Slave, ports: &[PortsLine]) -> Result<Known, Failure> {
+    let position = slave.line.position;
+    let description = description(session, master, position)?;
+    let has_clock = has_clock(session, master, position, &description)?;
+    Ok(Known { description, has_clock, ports: of_slave(ports, position) })
 }
 
 /// What is known of a SubDevice.

@@ -6,9 +6,11 @@ use crate::aborts::of_soe;
 use crate::data_types;
 use crate::failure::Failure;
 use crate::hex;
+use crate::json;
+use crate::json::reads::{Idn, Value};
 use crate::numbers;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// Drives behind a SubDevice.
 const DRIVES: u8 = 8;
@@ -42,6 +44,7 @@ pub const COMMAND: Command = Command {
     forms: &["<IDN>", "<DRIVE> <IDN>"],
     help: help!("Without a data type the bytes are printed.\n"),
     options: super::reg_read::TYPED,
+    output: Output::Data,
     run,
 };
 
@@ -55,6 +58,10 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let (master, position) = session.single_slave()?;
     let asked = session.ask(master, Query::IdnRead { position, drive, idn }, Vec::new());
     let (_, bytes) = asked.map_err(|failure| of_soe(failure, "read"))?;
+    if session.arguments.json {
+        let Value { data_type, value, data } = Value::new(data_type, &bytes)?;
+        return json::print(session, &Idn { master, position, drive, idn, data_type, value, data });
+    }
     match data_type {
         Some(data_type) => session.write(&data_type.show(&bytes)?),
         None => writeln!(session, "{}", hex::listed(&bytes)),

@@ -8,7 +8,7 @@ use crate::aborts::of_soe;
 use crate::data_types;
 use crate::failure::Failure;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// The command.
 pub const COMMAND: Command = Command {
@@ -17,6 +17,7 @@ pub const COMMAND: Command = Command {
     forms: &["<IDN> <VALUE>", "<DRIVE> <IDN> <VALUE>"],
     help: super::soe_read::WRITE_HELP,
     options: super::reg_read::TYPED,
+    output: Output::Nothing,
     run,
 };
 

@@ -6,9 +6,11 @@ use ringcat_control::tool::{ToolAnswer, ToolQuery};
 use crate::aborts::of_sdo;
 use crate::data_types::{self, DataType};
 use crate::failure::Failure;
+use crate::json;
+use crate::json::reads::{Upload, Value};
 use crate::numbers;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// Help of both commands for objects.
 macro_rules! help {
@@ -54,6 +56,7 @@ pub const COMMAND: Command = Command {
     forms: &["<INDEX> <SUBINDEX>"],
     help: help!(),
     options: OPTIONS,
+    output: Output::Data,
     run,
 };
 
@@ -67,6 +70,10 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     };
     let ask = Query::SdoUpload { position, index, sub_index: Some(sub_index) };
     let (_, value) = session.ask(master, ask, Vec::new()).map_err(of_sdo)?;
+    if session.arguments.json {
+        let Value { data_type, value, data } = Value::new(Some(data_type), &value)?;
+        return json::print(session, &Upload { master, position, index, subindex: sub_index, data_type, value, data });
+    }
     session.write(&data_type.show(&value)?)
 }
 

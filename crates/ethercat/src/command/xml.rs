@@ -4,10 +4,12 @@ use ringcat_control::tool::{Description, PdoEntryLine, PdoLine};
 
 use super::slaves::description;
 use crate::failure::Failure;
+use crate::json;
+use crate::json::texts::Text;
 use crate::selection::Slave;
 use crate::selection_help::SELECTION;
 use crate::session::Session;
-use crate::shape::Command;
+use crate::shape::{Command, Output};
 
 /// The command.
 pub const COMMAND: Command = Command {
@@ -18,6 +20,7 @@ pub const COMMAND: Command = Command {
 output is well-formed UTF-8 whatever names hold.
 ",
     options: SELECTION,
+    output: Output::Data,
     run,
 };
 
@@ -25,20 +28,22 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let master = session.single_master()?;
     let slaves = session.slaves(master)?;
     let is_list = slaves.len() > 1;
-    session.write(b"<?xml version=\"1.0\" ?>\n")?;
+    let mut text = "<?xml version=\"1.0\" ?>\n".to_owned();
     if is_list {
-        session.write(b"<EtherCATInfoList>\n")?;
+        text += "<EtherCATInfoList>\n";
     }
     let indent = if is_list { "  " } else { "" };
     for slave in slaves {
         let details = description(session, master, slave.line.position)?;
-        let text: String = info(&slave, &details).lines().map(|line| format!("{indent}{line}\n")).collect();
-        session.write(text.as_bytes())?;
+        text.extend(info(&slave, &details).lines().map(|line| format!("{indent}{line}\n")));
     }
     if is_list {
-        session.write(b"</EtherCATInfoList>\n")?;
+        text += "</EtherCATInfoList>\n";
     }
-    Ok(())
+    if session.arguments.json {
+        return json::print(session, &Text { master, text: &text });
+    }
+    session.write(text.as_bytes())
 }
 
 fn info(slave: &Slave, details: &Description) -> String {

@@ -32,7 +32,7 @@ impl Numbers {
     }
 }
 
-const WORDS: [&str; 38] = [
+const WORDS: [&str; 39] = [
     "-",
     "--",
     "-v",
@@ -49,6 +49,7 @@ const WORDS: [&str; 38] = [
     "-o",
     "--type",
     "--type=",
+    "--json",
     "--=",
     "--",
     "-p-",

@@ -261,6 +261,8 @@ fn ip_parameters_are_set_where_the_slave_speaks_ethernet() {
     let ethernet = started.expect("it runs");
     bench.wait_until("an interface", || bench.good(&["eoe"]).contains("\n     eoe0s0      0     up  "));
     assert_eq!(bench.good(&["eoe"]).lines().count(), 3);
+    let interface = &bench.one(&["eoe"])["interfaces"][0];
+    assert!(interface["interface"] == "eoe0s0" && interface["position"] == 0 && interface["up"] == true, "{interface}");
     drop(ethernet);
     bench.wait_until("no interface", || bench.good(&["eoe"]).is_empty());
 }

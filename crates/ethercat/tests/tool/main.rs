@@ -10,6 +10,7 @@ mod golden;
 mod golden_bus;
 mod hostile;
 mod idle;
+mod json;
 mod operation;
 mod outputs;
 mod ring_and_clocks;

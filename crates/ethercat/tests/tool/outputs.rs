@@ -126,3 +126,21 @@ fn all_outputs_with_names_are_utf_8_of_one_line_each() {
     }
     assert_eq!(bench.good(&["slaves"]).lines().count(), 3);
 }
+
+// covers: daemon, json
+#[test]
+fn json_is_one_line_of_utf8_whatever_names_hold() {
+    let bench = hostile();
+    let slaves = bench.one(&["slaves", "-v"]);
+    let input = &slaves["subdevices"][1];
+    assert_eq!(input["order_number"], "\"*/\\]>");
+    // Latin-1 is converted, as in the text; control characters stay.
+    let name = "]]><&\"'\u{1}\u{2}\u{1b}\u{ff}\u{c3}(\u{e4}\u{f6}*/ /* ??/\n\r\t\\x";
+    let shown = |name: &str| name.chars().map(|it| if it.is_control() { ' ' } else { it }).collect::<String>();
+    assert_eq!(input["name"].as_str().map(shown), Some(shown(name)), "{input}");
+    let pdos = bench.one(&["pdos"]);
+    assert_eq!(pdos["subdevices"][0]["sync_managers"][3]["pdos"][0]["name"], "*/\"\\ ;}{\\");
+    for command in ["xml", "graph", "cstruct"] {
+        assert_eq!(bench.one(&[command])["text"], bench.good(&[command]), "{command}");
+    }
+}

@@ -1,0 +1,74 @@
+//! The documentation of all keys, made from the types: `docs/ethercat-json.md` has to agree with them.
+
+use std::borrow::Cow;
+use std::path::Path;
+
+use ringcat_keys::{Table, check_keys, check_page, keys};
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+
+use super::{Line, config, domains, master, pdos, reads, ring, sdos, slaves, texts};
+use crate::commands::ALL;
+use crate::data_types::Scalar;
+use crate::shape::Output;
+
+/// The line before the tables.
+const BEGIN: &str =
+    "<!-- Written from crates/ethercat/src/json: RINGCAT_WRITE_JSON_KEYS=1 cargo test -p ringcat-ethercat keys -->\n";
+
+impl JsonSchema for Scalar {
+    fn schema_name() -> Cow<'static, str> {
+        "Scalar".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": ["integer", "number", "string", "null"] })
+    }
+}
+
+/// All tables: a heading, and the keys.
+fn all() -> Vec<Table> {
+    vec![
+        ("Every line", keys::<Line<'_, ()>>()),
+        ("`clocks`", keys::<ring::Clocks>()),
+        ("`config`", keys::<config::Config<'_>>()),
+        ("`crc`", keys::<slaves::Crc<'_>>()),
+        ("`cstruct`", keys::<texts::Text<'_>>()),
+        ("`data`", keys::<domains::Data>()),
+        ("`domains`", keys::<domains::Domains>()),
+        ("`eoe`", keys::<texts::Ethernet<'_>>()),
+        ("`events`", keys::<ring::Event<'_>>()),
+        ("`foe_read`", keys::<reads::File<'_>>()),
+        ("`graph`", keys::<texts::Text<'_>>()),
+        ("`master`", keys::<master::Master<'_>>()),
+        ("`pdos`", keys::<pdos::Pdos<'_>>()),
+        ("`reg_read`", keys::<reads::Registers>()),
+        ("`ring`", keys::<ring::Ring>()),
+        ("`sdos`", keys::<sdos::Sdos<'_>>()),
+        ("`sii_read`", keys::<reads::Sii>()),
+        ("`slaves`", keys::<slaves::Slaves<'_>>()),
+        ("`soe_read`", keys::<reads::Idn>()),
+        ("`upload`", keys::<reads::Upload>()),
+        ("`version`", keys::<texts::Version>()),
+        ("`xml`", keys::<texts::Text<'_>>()),
+    ]
+}
+
+// covers: daemon, json
+#[test]
+fn the_page_of_all_keys_agrees_with_the_types() {
+    check_page(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/ethercat-json.md")), BEGIN, &all());
+}
+
+// covers: daemon, json
+#[test]
+fn every_key_has_a_type_a_meaning_and_a_unit() {
+    check_keys(&all());
+}
+
+// covers: daemon, json
+#[test]
+fn every_command_that_prints_data_has_a_table_of_keys() {
+    let tables: Vec<String> = all().iter().skip(1).map(|(heading, _)| heading.trim_matches('`').to_owned()).collect();
+    let commands = ALL.into_iter().filter(|command| command.output == Output::Data);
+    assert_eq!(tables, commands.map(|command| command.name).collect::<Vec<_>>());
+}

@@ -1,0 +1,104 @@
+//! What `pdos --json` prints.
+
+use ringcat_control::tool::{Description, PdoEntryLine, PdoLine, SyncManagerLine};
+use serde::Serialize;
+
+use super::values::Direction;
+
+/// SyncManagers of a master's SubDevices.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Pdos<'a> {
+    /// Number of the master
+    pub master: u32,
+    /// The selected SubDevices that have SyncManagers, in the order of their positions
+    pub subdevices: Vec<SubDevice<'a>>,
+}
+
+/// SyncManagers of a SubDevice.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct SubDevice<'a> {
+    /// Position on the bus, from 0
+    pub position: u16,
+    /// Its SyncManagers, from SM 0 on
+    pub sync_managers: Vec<SyncManager<'a>>,
+}
+
+/// A SyncManager.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct SyncManager<'a> {
+    /// Number of the SyncManager
+    pub sync_manager: usize,
+    /// Physical start address
+    pub start_address: u16,
+    /// Default length, in bytes
+    pub default_bytes: u16,
+    /// Control register
+    pub control: u8,
+    /// Enable byte
+    pub enable: u8,
+    /// `outputs` if the MainDevice writes it, `inputs` if it reads it
+    pub direction: Direction,
+    /// The PDOs that are assigned to it
+    pub pdos: Vec<Pdo<'a>>,
+}
+
+/// A PDO.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Pdo<'a> {
+    /// Index of the PDO
+    pub index: u16,
+    /// Its name; empty where it has none
+    pub name: &'a str,
+    /// Its entries
+    pub entries: Vec<Entry<'a>>,
+}
+
+/// An entry of a PDO.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Entry<'a> {
+    /// Index of the object; 0: a gap
+    pub index: u16,
+    /// Sub-index of the object
+    pub subindex: u8,
+    /// Length, in bits
+    pub length_bits: u8,
+    /// Its name; empty where it has none
+    pub name: &'a str,
+}
+
+impl<'a> SubDevice<'a> {
+    /// A SubDevice with its SyncManagers.
+    pub fn new(position: u16, details: &'a Description) -> SubDevice<'a> {
+        SubDevice { position, sync_managers: details.sync_managers.iter().enumerate().map(sync_manager).collect() }
+    }
+}
+
+fn sync_manager((sync_manager, line): (usize, &SyncManagerLine)) -> SyncManager<'_> {
+    SyncManager {
+        sync_manager,
+        start_address: line.start,
+        default_bytes: line.length,
+        control: line.control,
+        enable: line.enable,
+        direction: Direction::of(line.is_output),
+        pdos: pdos(&line.pdos),
+    }
+}
+
+/// PDOs with their entries.
+pub fn pdos(lines: &[PdoLine]) -> Vec<Pdo<'_>> {
+    lines.iter().map(pdo).collect()
+}
+
+fn pdo(line: &PdoLine) -> Pdo<'_> {
+    Pdo { index: line.index, name: &line.name, entries: line.entries.iter().map(entry).collect() }
+}
+
+fn entry(line: &PdoEntryLine) -> Entry<'_> {
+    Entry { index: line.index, subindex: line.sub_index, length_bits: line.bits, name: &line.name }
+}

@@ -1,0 +1,134 @@
+//! What commands with `--json` print that read from one SubDevice: `upload`, `reg_read`, `soe_read`, `sii_read`,
+//! `foe_read`.
+
+use serde::Serialize;
+
+use crate::data_types::{DataType, Scalar};
+use crate::failure::Failure;
+use crate::hex;
+
+/// A value as its data type tells it.
+pub struct Value {
+    /// Name of the data type.
+    pub data_type: Option<&'static str>,
+    /// The value.
+    pub value: Scalar,
+    /// Its bytes in hexadecimal digits.
+    pub data: String,
+}
+
+impl Value {
+    /// The value of these bytes.
+    ///
+    /// # Errors
+    /// They have another size than the data type.
+    pub fn new(data_type: Option<DataType>, bytes: &[u8]) -> Result<Value, Failure> {
+        let value = data_type.map_or(Ok(Scalar::Nothing), |it| it.value(bytes))?;
+        Ok(Value { data_type: data_type.map(|it| it.name), value, data: hex::digits(bytes) })
+    }
+}
+
+/// An entry of an object.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Upload {
+    /// Number of the master
+    pub master: u32,
+    /// Position of the SubDevice on the bus, from 0
+    pub position: u16,
+    /// Index of the object
+    pub index: u16,
+    /// Sub-index of the entry
+    pub subindex: u8,
+    /// Name of the data type, as `--type` takes it; null without one
+    pub data_type: Option<&'static str>,
+    /// The value: a number, or a text of type `string`; null for types of bytes, without a type, and where it is no
+    /// finite number or no UTF-8
+    pub value: Scalar,
+    /// Its bytes as they are, in hexadecimal digits
+    pub data: String,
+}
+
+/// Registers.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Registers {
+    /// Number of the master
+    pub master: u32,
+    /// Position of the SubDevice on the bus, from 0
+    pub position: u16,
+    /// Address of the first register
+    pub address: u16,
+    /// Name of the data type, as `--type` takes it; null without one
+    pub data_type: Option<&'static str>,
+    /// The value: a number, or a text of type `string`; null for types of bytes, without a type, and where it is no
+    /// finite number or no UTF-8
+    pub value: Scalar,
+    /// Its bytes as they are, in hexadecimal digits
+    pub data: String,
+}
+
+/// An IDN.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Idn {
+    /// Number of the master
+    pub master: u32,
+    /// Position of the SubDevice on the bus, from 0
+    pub position: u16,
+    /// Drive behind the SubDevice, 0 to 7
+    pub drive: u8,
+    /// Number of the IDN; bit 15: it is specific to the product (`P`)
+    pub idn: u16,
+    /// Name of the data type, as `--type` takes it; null without one
+    pub data_type: Option<&'static str>,
+    /// The value: a number, or a text of type `string`; null for types of bytes, without a type, and where it is no
+    /// finite number or no UTF-8
+    pub value: Scalar,
+    /// Its bytes as they are, in hexadecimal digits
+    pub data: String,
+}
+
+/// An SII.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Sii {
+    /// Number of the master
+    pub master: u32,
+    /// Position of the SubDevice on the bus, from 0
+    pub position: u16,
+    /// Length of the SII, in bytes
+    pub length_bytes: usize,
+    /// Its categories, in their order; null where they do not end within the SII
+    pub categories: Option<Vec<Category>>,
+    /// The whole SII, in hexadecimal digits
+    pub data: String,
+}
+
+/// A category of an SII.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Category {
+    /// Number of the category
+    pub category: u16,
+    /// Its name in the text, such as `TXPDO`; `unknown` for those that the tool does not know
+    pub name: &'static str,
+    /// Its bytes without number and length, in hexadecimal digits
+    pub data: String,
+}
+
+/// A file.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct File<'a> {
+    /// Number of the master
+    pub master: u32,
+    /// Position of the SubDevice on the bus, from 0
+    pub position: u16,
+    /// Name of the file on the SubDevice
+    pub file: &'a str,
+    /// Its length, in bytes
+    pub length_bytes: usize,
+    /// Its bytes, in hexadecimal digits; null where --output-file names a file for them
+    pub data: Option<String>,
+}

@@ -1,0 +1,163 @@
+//! What `ring --json`, `clocks --json` and `events --json` print.
+
+use ringcat_control::message::{CableSnapshot, ClockSnapshot, EventLine, Snapshot};
+use serde::Serialize;
+
+use super::values::Link;
+
+/// The ring of a master.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Ring {
+    /// Number of the master
+    pub master: u32,
+    /// Whether the ring is closed; null with one link, and while it is not known
+    pub closed: Option<bool>,
+    /// Whether a further break leaves all SubDevices reachable; null with one link, and while it is not known
+    pub redundant: Option<bool>,
+    /// The links: one, or both ends of the ring
+    pub links: Vec<RingLink>,
+    /// The cable that is broken; null without a break, and while its place is not known
+    pub line_break: Option<Cable>,
+    /// Every cable with the errors at both its ends, while an application is active; empty without one
+    pub cables: Vec<CableErrors>,
+}
+
+/// A link.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct RingLink {
+    /// `main` or `redundant`
+    pub link: Link,
+    /// SubDevices that answer on it
+    pub subdevices: u16,
+    /// Whether it has a carrier; null where that is not known
+    pub carrier: Option<bool>,
+}
+
+/// A cable.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Cable {
+    /// Its end towards the main interface; null: that interface
+    pub near: Option<CableEnd>,
+    /// Its other end; null: the redundant interface
+    pub far: Option<CableEnd>,
+}
+
+/// A cable and its errors.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct CableErrors {
+    /// Its end towards the main interface; null: that interface
+    pub near: Option<CableEnd>,
+    /// Its other end; null: the redundant interface
+    pub far: Option<CableEnd>,
+    /// Damaged frames since the application was activated
+    pub damaged_frames: u64,
+    /// Lost links since the application was activated
+    pub lost_links: u64,
+}
+
+/// An end of a cable.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct CableEnd {
+    /// Position of the SubDevice on the bus, from 0
+    pub position: usize,
+    /// Number of its port, 0 to 3
+    pub port: u8,
+}
+
+impl Ring {
+    /// The ring of a master with this number of links, and SubDevices on each.
+    pub fn new(master: u32, state: &Snapshot, counts: [u16; 2], links: usize) -> Ring {
+        let ring = &state.ring;
+        let is_ring = links >= Link::BOTH.len();
+        let seen = Link::BOTH.into_iter().zip(&ring.links).zip(counts).take(links);
+        let answering = seen.map(|((link, seen), subdevices)| RingLink { link, subdevices, carrier: seen.carrier });
+        Ring {
+            master,
+            closed: ring.closed.filter(|_| is_ring),
+            redundant: ring.redundant.filter(|_| is_ring),
+            links: answering.collect(),
+            line_break: ring.break_at.as_ref().map(|cable| Cable { near: end(cable.near), far: end(cable.far) }),
+            cables: state.cables.iter().map(errors).collect(),
+        }
+    }
+}
+
+fn end(port: Option<(usize, u8)>) -> Option<CableEnd> {
+    port.map(|(position, port)| CableEnd { position, port })
+}
+
+fn errors(cable: &CableSnapshot) -> CableErrors {
+    let [damaged_frames, lost_links] = cable.errors;
+    CableErrors { near: end(cable.near), far: end(cable.far), damaged_frames, lost_links }
+}
+
+/// The clocks of a master.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Clocks {
+    /// Number of the master
+    pub master: u32,
+    /// The distributed clocks; empty where no application uses them
+    pub clocks: Vec<Clock>,
+}
+
+/// A clock.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Clock {
+    /// Position of the SubDevice on the bus, from 0
+    pub position: u16,
+    /// Propagation delay from the reference clock, in nanoseconds
+    pub delay_ns: i64,
+    /// Drift towards the reference clock, in parts per billion
+    pub drift_ppb: i64,
+    /// Difference from the reference clock, in nanoseconds; null before the first measurement
+    pub difference_ns: Option<i32>,
+    /// The largest difference since the clock was locked, in nanoseconds
+    pub largest_ns: u32,
+    /// Whether it is the reference clock
+    pub reference: bool,
+    /// Whether it is locked to the reference clock
+    pub locked: bool,
+}
+
+impl Clock {
+    /// A clock.
+    pub fn new(clock: &ClockSnapshot) -> Clock {
+        Clock {
+            position: clock.position,
+            delay_ns: clock.delay_ns,
+            drift_ppb: clock.drift_ppb,
+            difference_ns: clock.difference_ns,
+            largest_ns: clock.worst_ns,
+            reference: clock.is_reference,
+            locked: clock.is_locked,
+        }
+    }
+}
+
+/// An event.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Event<'a> {
+    /// Number of the master
+    pub master: u32,
+    /// Number of the event; each process that drives the bus begins anew
+    pub number: u64,
+    /// Time since the host was started, in nanoseconds
+    pub time_ns: u64,
+    /// The event in words, for people: they may change without a new version
+    pub text: &'a str,
+}
+
+impl<'a> Event<'a> {
+    /// An event of a master.
+    pub fn new(master: u32, line: &'a EventLine) -> Event<'a> {
+        Event { master, number: line.number, time_ns: line.at_ns, text: &line.text }
+    }
+}

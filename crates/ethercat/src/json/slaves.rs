@@ -1,0 +1,139 @@
+//! What `slaves --json` and `crc --json` print.
+
+use ringcat_control::tool::{PortLine, PortsLine};
+use serde::Serialize;
+
+use super::details::Details;
+use super::values::{Link, state};
+use crate::selection::Slave;
+
+/// SubDevices of a master.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Slaves<'a> {
+    /// Number of the master
+    pub master: u32,
+    /// The selected SubDevices, in the order of their positions
+    pub subdevices: Vec<SubDevice<'a>>,
+}
+
+/// A SubDevice.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct SubDevice<'a> {
+    /// Position on the bus, from 0
+    pub position: u16,
+    /// Station alias of the SubDevice; 0: none
+    pub alias: u16,
+    /// The last alias at or before it, from which `relative_position` counts; 0: it counts from the begin of the bus
+    pub last_alias: u16,
+    /// Position behind the SubDevice with the last alias
+    pub relative_position: u16,
+    /// `INIT`, `PREOP`, `BOOT`, `SAFEOP` or `OP`; null where it does not answer, or reports none of them
+    pub state: Option<&'static str>,
+    /// Whether it reports an error or does not answer: the flag `E` of the text
+    pub error: bool,
+    /// Register 0x0130, AL_STATUS; null where it does not answer
+    pub al_status: Option<u16>,
+    /// The link on which it answers: `main`, or `redundant` behind a break of the ring
+    pub link: Link,
+    /// Name of its SII; empty where it has none
+    pub name: &'a str,
+    /// Order number of its SII; empty where it has none
+    pub order_number: &'a str,
+    /// Vendor ID
+    pub vendor_id: u32,
+    /// Product code
+    pub product_code: u32,
+    /// Revision number
+    pub revision: u32,
+    /// Serial number
+    pub serial: u32,
+    /// What else is known of it; null without --verbose
+    pub details: Option<Details<'a>>,
+}
+
+impl<'a> SubDevice<'a> {
+    /// A SubDevice with what else is known of it.
+    pub fn new(slave: &'a Slave, details: Option<Details<'a>>) -> SubDevice<'a> {
+        let Slave { line, alias, relative } = slave;
+        let [vendor_id, product_code, revision, serial] = line.identity;
+        SubDevice {
+            position: line.position,
+            alias: line.alias,
+            last_alias: *alias,
+            relative_position: *relative,
+            state: state(line.status),
+            error: slave.has_error(),
+            al_status: line.status,
+            link: Link::of(line.is_redundant),
+            name: &line.name,
+            order_number: &line.order,
+            vendor_id,
+            product_code,
+            revision,
+            serial,
+            details,
+        }
+    }
+}
+
+/// Error counters of a master's SubDevices.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Crc<'a> {
+    /// Number of the master
+    pub master: u32,
+    /// The SubDevices, in the order of their positions
+    pub subdevices: Vec<Counted<'a>>,
+}
+
+/// Error counters of a SubDevice.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Counted<'a> {
+    /// Position on the bus, from 0
+    pub position: u16,
+    /// Name of its SII; empty where it has none
+    pub name: &'a str,
+    /// Its four ports
+    pub ports: Vec<CountedPort>,
+}
+
+/// Error counters of a port. They end at 255.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct CountedPort {
+    /// Number of the port, 0 to 3
+    pub port: usize,
+    /// Whether it has a link
+    pub link: bool,
+    /// Invalid frames: registers 0x0300 and following
+    pub invalid_frames: u8,
+    /// Receive errors: registers 0x0301 and following
+    pub receive_errors: u8,
+    /// Errors that were found before: registers 0x0308 and following
+    pub forwarded_errors: u8,
+    /// Lost links: registers 0x0310 and following
+    pub lost_links: u8,
+    /// Position of the SubDevice at the other end; null where there is none
+    pub neighbour: Option<u16>,
+}
+
+impl<'a> Crc<'a> {
+    /// SubDevices with their ports.
+    pub fn new(master: u32, slaves: &'a [Slave], of: impl Fn(u16) -> PortsLine) -> Crc<'a> {
+        let counted = |slave: &'a Slave| {
+            let position = slave.line.position;
+            let ports = of(position).ports.iter().enumerate().map(|(port, line)| counted_port(port, line)).collect();
+            Counted { position, name: &slave.line.name, ports }
+        };
+        Crc { master, subdevices: slaves.iter().map(counted).collect() }
+    }
+}
+
+fn counted_port(port: usize, line: &PortLine) -> CountedPort {
+    let [invalid_frames, receive_errors, forwarded_errors, lost_links] = line.errors;
+    let (link, neighbour) = (line.link[0], line.neighbour);
+    CountedPort { port, link, invalid_frames, receive_errors, forwarded_errors, lost_links, neighbour }
+}
