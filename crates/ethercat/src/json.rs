@@ -15,36 +15,32 @@ pub mod sdos;
 pub mod slaves;
 pub mod texts;
 pub mod values;
+mod writer;
 
 use serde::Serialize;
 
 use crate::failure::Failure;
 use crate::session::Session;
+use writer::{Unsupported, Writer};
 
 /// Version of all keys together.
 pub const SCHEMA_VERSION: u32 = 1;
-
-/// What every line begins with.
-#[derive(Serialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct Line<'a, T> {
-    /// Version of the keys on this page
-    pub schema_version: u32,
-    /// The command that prints the line
-    pub command: &'a str,
-    /// The keys of the command.
-    #[serde(flatten)]
-    #[cfg_attr(test, schemars(skip))]
-    pub data: &'a T,
-}
 
 /// Prints a line with the keys of the command.
 ///
 /// # Errors
 /// The output is closed.
 pub fn print<T: Serialize>(session: &mut Session<'_>, data: &T) -> Result<(), Failure> {
-    let line = Line { schema_version: SCHEMA_VERSION, command: session.name, data };
-    let mut bytes = serde_json::to_vec(&line).map_err(|error| Failure::failed(error.to_string()))?;
-    bytes.push(b'\n');
-    session.write(&bytes)
+    print_with(session, &|writer| data.serialize(writer))
+}
+
+/// Writes the keys of a command.
+type Fill<'f> = dyn Fn(&mut Writer) -> Result<(), Unsupported> + 'f;
+
+fn print_with(session: &mut Session<'_>, fill: &Fill<'_>) -> Result<(), Failure> {
+    let mut writer = Writer::object(SCHEMA_VERSION, session.name);
+    fill(&mut writer).map_err(|error| Failure::failed(error.to_string()))?;
+    let mut text = writer.into_text();
+    text.push('\n');
+    session.write(text.as_bytes())
 }

@@ -13,6 +13,7 @@
 #![forbid(unsafe_code)]
 
 pub mod aborts;
+mod append;
 pub mod arguments;
 mod command;
 pub mod commands;
@@ -27,6 +28,7 @@ mod json;
 pub mod manual;
 pub mod numbers;
 pub mod options_help;
+mod order;
 pub mod selection;
 pub mod selection_help;
 pub mod session;

@@ -3,6 +3,7 @@
 use ringcat_control::tool::{DeclaredLine, SubDeviceLine};
 
 use crate::numbers::List;
+use crate::order;
 
 /// A SubDevice, and the alias from which it is counted.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -97,9 +98,8 @@ pub fn declared(all: Vec<DeclaredLine>, aliases: Option<&List>, positions: Optio
         (Some(aliases), None) => aliases.has(line.alias.into()),
         (Some(aliases), Some(positions)) => aliases.has(line.alias.into()) && positions.has(line.position.into()),
     };
-    let mut selected: Vec<DeclaredLine> = all.into_iter().filter(is_selected).collect();
-    selected.sort_by_key(|line| (line.alias, line.position));
-    selected
+    let selected = all.into_iter().filter(is_selected).collect();
+    order::by_key(selected, |line| u32::from(line.alias) << 16 | u32::from(line.position))
 }
 
 #[cfg(test)]

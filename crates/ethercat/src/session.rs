@@ -13,6 +13,7 @@ use ringcat_control::{Client, Refusal};
 use crate::arguments::Arguments;
 use crate::failure::{Failure, unexpected};
 use crate::numbers::List;
+use crate::order;
 use crate::selection::{self, Slave};
 use crate::standalone::Standalone;
 
@@ -161,10 +162,7 @@ impl<'a> Session<'a> {
             None => Failure::failed(format!("Failed to obtain number of masters: {text}")),
         };
         match asked {
-            Ok((Answer::Masters(mut masters), _)) => {
-                masters.sort_by_key(|master| master.master);
-                Ok(masters)
-            }
+            Ok((Answer::Masters(masters), _)) => Ok(order::by_key(masters, |master| master.master)),
             Ok(_) => Err(unexpected()),
             Err(Failure::Asked(error)) => Err(failed(error.to_string())),
             Err(other) => Err(other),

@@ -91,7 +91,7 @@ const RULES: &[CrateRule] = &[
             "ringcat-keys",
             "ringcat-wire",
         ]),
-        external: External::Only(&["serde", "serde_json"]),
+        external: External::Only(&["serde"]),
     },
     CrateRule {
         directory: "ffi",

@@ -6,32 +6,39 @@ use std::net::Ipv4Addr;
 use ringcat_control::tool::{DeclaredLine, DeclaredSyncManager, IpParameters, MOST_STARTUP};
 use ringcat_wire::mailbox::soe::Idn;
 
+use crate::append::append;
 use crate::hex;
 
 /// The block of one declared SubDevice; `attached` is its position and state.
 pub fn details(indent: &str, line: &DeclaredLine, attached: &Option<(u16, String)>) -> String {
     let [vendor, product] = line.identity;
     let mut text = format!("Alias: {}\nPosition: {}\n", line.alias, line.position);
-    text += &format!("Vendor Id: 0x{vendor:08x}\nProduct code: 0x{product:08x}\n");
+    append!(text, "Vendor Id: 0x{vendor:08x}\nProduct code: 0x{product:08x}\n");
     text += &match attached {
         Some((position, state)) => format!("Attached slave: {position} ({state})\n"),
         None => "Attached slave: none\n".to_owned(),
     };
     let number = |value: Option<u16>| value.map_or("(Default)".to_owned(), |value| value.to_string());
     let [divider, intervals] = line.watchdog.map(number);
-    text += &format!("Watchdog divider: {divider}\nWatchdog intervals: {intervals}\n");
+    append!(text, "Watchdog divider: {divider}\nWatchdog intervals: {intervals}\n");
     line.sync_managers.iter().for_each(|own| text += &sync_manager(own));
     text += "SDO configuration:\n";
     for sdo in &line.sdos {
         let entry = sdo.sub_index.map_or(" C".to_owned(), |sub_index| format!(":{sub_index:02x}"));
-        text += &format!("  0x{:04x}{entry}, {} byte\n{}", sdo.index, sdo.length, data(&sdo.data, sdo.length));
+        append!(text, "  0x{:04x}{entry}, {} byte\n{}", sdo.index, sdo.length, data(&sdo.data, sdo.length));
     }
     text += if line.sdos.is_empty() { "  None.\n" } else { "" };
     text += "IDN configuration:\n";
     for idn in &line.idns {
         let name = Idn(idn.idn);
-        text +=
-            &format!("  Drive {}, {}, {} byte\n{}", idn.drive, idn_name(name), idn.length, data(&idn.data, idn.length));
+        append!(
+            text,
+            "  Drive {}, {}, {} byte\n{}",
+            idn.drive,
+            idn_name(name),
+            idn.length,
+            data(&idn.data, idn.length)
+        );
     }
     text += if line.idns.is_empty() { "  None.\n" } else { "" };
     text += &flags(line);
@@ -39,10 +46,10 @@ pub fn details(indent: &str, line: &DeclaredLine, attached: &Option<(u16, String
         text += &ip_parameters(ip);
     }
     if let Some(clock) = &line.clock {
-        text += &format!("DC configuration:\n  AssignActivate: 0x{:04x}\n", clock.assign_activate);
+        append!(text, "DC configuration:\n  AssignActivate: 0x{:04x}\n", clock.assign_activate);
         text += "         Cycle [ns]   Shift [ns]\n";
         for (number, (cycle, shift)) in (0..).zip(clock.cycles_ns.into_iter().zip(clock.shifts_ns)) {
-            text += &format!("  SYNC{number}  {cycle:>11}  {shift:>11}\n");
+            append!(text, "  SYNC{number}  {cycle:>11}  {shift:>11}\n");
         }
     }
     text.lines().map(|line| format!("{indent}{line}\n")).chain(["\n".to_owned()]).collect()
@@ -84,7 +91,7 @@ fn flags(line: &DeclaredLine) -> String {
         text += "  AssignToPdi: 1\n";
     }
     if line.wait_before_safeop_ms != 0 {
-        text += &format!("  WaitBeforeSAFEOPms: {}\n", line.wait_before_safeop_ms);
+        append!(text, "  WaitBeforeSAFEOPms: {}\n", line.wait_before_safeop_ms);
     }
     if !line.sii_to_pdi && line.wait_before_safeop_ms == 0 {
         text += "  None.\n";

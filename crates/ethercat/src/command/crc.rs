@@ -3,6 +3,7 @@
 use ringcat_control::message::Query;
 use ringcat_control::tool::{MOST_SUBDEVICES, Piece, PortLine, PortsLine, ToolAnswer, ToolQuery};
 
+use crate::append::append;
 use crate::failure::{Failure, unexpected};
 use crate::json;
 use crate::json::slaves::Crc;
@@ -89,7 +90,7 @@ fn table(slaves: &[Slave], ports: &[PortsLine]) -> String {
         let own = of_slave(ports, position);
         let cells: String = own.ports.iter().map(|port| cell(position, port) + "|").collect();
         let name: String = slave.line.name.chars().take(NAME).collect();
-        text += &format!("{position:>3}|{cells}{name}\n");
+        append!(text, "{position:>3}|{cells}{name}\n");
     }
     text
 }

@@ -3,6 +3,7 @@
 use ringcat_control::tool::{Description, SyncManagerLine};
 
 use super::slaves::description;
+use crate::append::append;
 use crate::failure::Failure;
 use crate::json;
 use crate::json::texts::Text;
@@ -64,30 +65,30 @@ fn structures(master: u32, slave: &Slave, details: &Description) -> String {
     let order =
         if slave.line.order.is_empty() { String::new() } else { format!(", \"{}\"", comment(&slave.line.order)) };
     let mut text = format!("/* Master {master}, Slave {position}{order}\n");
-    text += &format!(" * Vendor ID:       0x{vendor:08x}\n * Product code:    0x{product:08x}\n");
-    text += &format!(" * Revision number: 0x{revision:08x}\n */\n\n");
+    append!(text, " * Vendor ID:       0x{vendor:08x}\n * Product code:    0x{product:08x}\n");
+    append!(text, " * Revision number: 0x{revision:08x}\n */\n\n");
     let pdos = || details.sync_managers.iter().flat_map(|own| &own.pdos);
     if pdos().any(|pdo| !pdo.entries.is_empty()) {
-        text += &format!("ec_pdo_entry_info_t slave_{position}_pdo_entries[] = {{\n");
+        append!(text, "ec_pdo_entry_info_t slave_{position}_pdo_entries[] = {{\n");
         for entry in pdos().flat_map(|pdo| &pdo.entries) {
             let name = named(&entry.name);
-            text += &format!("    {{0x{:04x}, 0x{:02x}, {}}},{name}\n", entry.index, entry.sub_index, entry.bits);
+            append!(text, "    {{0x{:04x}, 0x{:02x}, {}}},{name}\n", entry.index, entry.sub_index, entry.bits);
         }
         text += "};\n\n";
     }
     if pdos().next().is_some() {
-        text += &format!("ec_pdo_info_t slave_{position}_pdos[] = {{\n");
+        append!(text, "ec_pdo_info_t slave_{position}_pdos[] = {{\n");
         let mut first = 0;
         for pdo in pdos() {
             let count = pdo.entries.len();
             let entries =
                 if count == 0 { "NULL".to_owned() } else { format!("slave_{position}_pdo_entries + {first}") };
-            text += &format!("    {{0x{:04x}, {count}, {entries}}},{}\n", pdo.index, named(&pdo.name));
+            append!(text, "    {{0x{:04x}, {count}, {entries}}},{}\n", pdo.index, named(&pdo.name));
             first += count;
         }
         text += "};\n\n";
     }
-    text += &format!("ec_sync_info_t slave_{position}_syncs[] = {{\n");
+    append!(text, "ec_sync_info_t slave_{position}_syncs[] = {{\n");
     let mut first = 0;
     for (number, own) in details.sync_managers.iter().enumerate() {
         text += &sync_manager(number, own, position, first);

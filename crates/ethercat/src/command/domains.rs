@@ -3,6 +3,7 @@
 use ringcat_control::message::{Answer, Query};
 use ringcat_control::tool::{DomainLine, ToolAnswer, ToolQuery};
 
+use crate::append::append;
 use crate::failure::{Failure, unexpected};
 use crate::hex;
 use crate::json;
@@ -82,8 +83,8 @@ fn areas(indent: &str, domain: &DomainLine, image: &[u8]) -> String {
     for area in &domain.areas {
         let (alias, position) = area.subdevice;
         let direction = if area.is_output { "Output" } else { " Input" };
-        text += &format!("{indent}  SlaveConfig {alias}:{position}, SM{} ({direction}), ", area.sync_manager);
-        text += &format!("LogAddr 0x{:08x}, Size {}\n", area.logical, area.length);
+        append!(text, "{indent}  SlaveConfig {alias}:{position}, SM{} ({direction}), ", area.sync_manager);
+        append!(text, "LogAddr 0x{:08x}, Size {}\n", area.logical, area.length);
         text += &hex::lines(&format!("{indent}    "), area_bytes(area.offset, area.length, image));
     }
     text

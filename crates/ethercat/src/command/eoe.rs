@@ -2,6 +2,7 @@
 
 use ringcat_control::tool::{EthernetLine, ToolAnswer, ToolQuery};
 
+use crate::append::append;
 use crate::failure::{Failure, unexpected};
 use crate::json;
 use crate::json::texts::{Ethernet, Interface};
@@ -41,8 +42,8 @@ fn table(master: u32, lines: &[EthernetLine]) -> String {
     for line in lines {
         let (state, [queued, size]) = (if line.is_up { "up" } else { "down" }, line.queue);
         let ([rx, tx], [rx_rate, tx_rate]) = (line.bytes, line.rates);
-        text += &format!("  {:>9}  {:>5}  {state:>5}  {rx:>7}  {rx_rate:>6}  ", line.name, line.position);
-        text += &format!("{tx:>7}  {tx_rate:>6}  {:>7}\n", format!("{queued}/{size}"));
+        append!(text, "  {:>9}  {:>5}  {state:>5}  {rx:>7}  {rx_rate:>6}  ", line.name, line.position);
+        append!(text, "{tx:>7}  {tx_rate:>6}  {:>7}\n", format!("{queued}/{size}"));
     }
     text
 }

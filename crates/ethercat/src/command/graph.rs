@@ -4,6 +4,7 @@ use ringcat_control::tool::{ClockFeatures, PortLine, PortsLine};
 
 use super::crc::ports;
 use super::slaves::{description, has_clock};
+use crate::append::append;
 use crate::failure::Failure;
 use crate::json;
 use crate::json::texts::Text;
@@ -79,19 +80,19 @@ strict graph bus {
     let of = |position: u16| ports.iter().find(|line| line.position == position).cloned().unwrap_or_default();
     if let Some(first) = slaves.first() {
         let medium = of(first.line.position).ports[0].kind;
-        text += &format!("    master -- slave{}[label=\"{}\"]\n", first.line.position, medium_name(medium));
+        append!(text, "    master -- slave{}[label=\"{}\"]\n", first.line.position, medium_name(medium));
     }
     text += "\n";
     for (at, slave) in slaves.iter().enumerate() {
         let (position, own) = (slave.line.position, of(slave.line.position));
         let mut label = format!("{position} / {}:{}", slave.alias, slave.relative);
         if !slave.line.order.is_empty() {
-            label += &format!("\\n{}", quoted(&slave.line.order));
+            append!(label, "\\n{}", quoted(&slave.line.order));
         }
         if let Some((features, has_clock)) = clocks.get(at).filter(|(features, _)| features.dc) {
-            label += &format!("\\n{}\\nDelay: {} ns", clock_name(features, *has_clock), own.delay_ns);
+            append!(label, "\\n{}\\nDelay: {} ns", clock_name(features, *has_clock), own.delay_ns);
         }
-        text += &format!("    slave{position} [shape=\"box\",label=\"{label}\"]\n");
+        append!(text, "    slave{position} [shape=\"box\",label=\"{label}\"]\n");
         for (number, port) in own.ports.iter().enumerate() {
             text += &edge(position, number, port, &of, more);
         }

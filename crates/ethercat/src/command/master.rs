@@ -6,6 +6,7 @@ use ringcat_control::client::ClientError;
 use ringcat_control::refusal::Refusal;
 use ringcat_control::tool::{ToolAnswer, ToolQuery};
 
+use crate::append::append;
 use crate::failure::{Failure, unexpected};
 use crate::json;
 use crate::json::master::{Device, Frames, Master, Phase, Rate};
@@ -76,10 +77,10 @@ fn text(master: &Master<'_>) -> String {
         Phase::Idle => "Idle",
     };
     let active = if master.active { "yes" } else { "no" };
-    text += &format!("  Phase: {phase}\n  Active: {active}\n  Slaves: {}\n  Ethernet devices:\n", master.subdevices);
+    append!(text, "  Phase: {phase}\n  Active: {active}\n  Slaves: {}\n  Ethernet devices:\n", master.subdevices);
     let Some(all) = &master.common else {
         for (title, name) in TITLES.iter().zip(&master.awaited_interfaces) {
-            text += &format!("    {title}: {name} (waiting...)\n");
+            append!(text, "    {title}: {name} (waiting...)\n");
         }
         return text;
     };
@@ -92,7 +93,7 @@ fn device(link: &Device) -> String {
     let state = if link.carrier == Some(false) { "DOWN" } else { "UP" };
     let mut text = format!("    {title}: {} (attached)\n      Link: {state}\n", link.mac_address);
     text += &counters(&link.frames);
-    text += &format!("      Tx errors:   {}\n", link.send_errors);
+    append!(text, "      Tx errors:   {}\n", link.send_errors);
     text + &rates(&link.frames)
 }
 
@@ -105,7 +106,7 @@ fn counters(frames: &Frames) -> String {
 
 fn common(all: &Frames) -> String {
     let mut text = "    Common:\n".to_owned() + &counters(all);
-    text += &format!("      Lost frames: {}\n", all.lost_frames);
+    append!(text, "      Lost frames: {}\n", all.lost_frames);
     text += &rates(all);
     text += &row("Loss rate [1/s]:", all, |rate| format!("{:.0}", rate.lost_frames_per_s));
     text + &row("Frame loss [%]:", all, |rate| {
@@ -131,8 +132,8 @@ fn row(title: &str, frames: &Frames, value: impl Fn(&Rate) -> String) -> String 
 fn clocks(master: &Master<'_>) -> String {
     let reference = master.reference_clock.map_or("None".to_owned(), |position| format!("Slave {position}"));
     let mut text = format!("  Distributed clocks:\n    Reference clock:   {reference}\n");
-    text += &format!("    DC reference time: {}\n", master.reference_time_ns);
-    text += &format!("    Application time:  {}\n", master.application_time_ns);
+    append!(text, "    DC reference time: {}\n", master.reference_time_ns);
+    append!(text, "    Application time:  {}\n", master.application_time_ns);
     text + &format!("                       {}\n", date(master.application_time_ns))
 }
 

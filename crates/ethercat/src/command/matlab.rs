@@ -2,6 +2,7 @@
 
 use ringcat_control::tool::{Description, SyncManagerLine};
 
+use crate::append::append;
 use crate::selection::Slave;
 
 /// The function of one SubDevice.
@@ -11,9 +12,9 @@ pub fn function(master: u32, slave: &Slave, details: &Description) -> String {
     let [vendor, product, ..] = slave.line.identity;
     let mut text =
         format!("%\n% Master {master}, Slave {position}, \"{order}\"\n%\nfunction rv = slave{position}()\n\n");
-    text += &format!("% Slave configuration\n\nrv.SlaveConfig.vendor = {vendor};\n");
-    text += &format!("rv.SlaveConfig.product = hex2dec('{product:08x}');\n");
-    text += &format!("rv.SlaveConfig.description = '{}';\nrv.SlaveConfig.sm = {{ ...\n", order.replace('\'', "''"));
+    append!(text, "% Slave configuration\n\nrv.SlaveConfig.vendor = {vendor};\n");
+    append!(text, "rv.SlaveConfig.product = hex2dec('{product:08x}');\n");
+    append!(text, "rv.SlaveConfig.description = '{}';\nrv.SlaveConfig.sm = {{ ...\n", order.replace('\'', "''"));
     for (number, own) in details.sync_managers.iter().enumerate() {
         text += &sync_manager(number, own);
     }
@@ -28,10 +29,10 @@ fn direction(own: &SyncManagerLine) -> u8 {
 fn sync_manager(number: usize, own: &SyncManagerLine) -> String {
     let mut text = format!("    {{{number}, {}, {{\n", direction(own));
     for pdo in &own.pdos {
-        text += &format!("        {{hex2dec('{:04x}'), [\n", pdo.index);
+        append!(text, "        {{hex2dec('{:04x}'), [\n", pdo.index);
         for entry in &pdo.entries {
             let (index, sub_index, bits) = (entry.index, entry.sub_index, entry.bits);
-            text += &format!("            hex2dec('{index:04x}'), hex2dec('{sub_index:02x}'), {bits:>3}; ...\n");
+            append!(text, "            hex2dec('{index:04x}'), hex2dec('{sub_index:02x}'), {bits:>3}; ...\n");
         }
         text += "            ]}, ...\n";
     }
@@ -47,8 +48,8 @@ fn ports(details: &Description) -> String {
                 let (kind, count) = if own.is_output { ("input", &mut inputs) } else { ("output", &mut outputs) };
                 *count += 1;
                 let port = format!("rv.PortConfig.{kind}({count})");
-                text += &format!("{port}.pdo = [{number}, {pdo_number}, {entry_number}, 0];\n");
-                text += &format!("{port}.pdo_data_type = {};\n\n", 1000 + u16::from(entry.bits));
+                append!(text, "{port}.pdo = [{number}, {pdo_number}, {entry_number}, 0];\n");
+                append!(text, "{port}.pdo_data_type = {};\n\n", 1000 + u16::from(entry.bits));
             }
         }
     }

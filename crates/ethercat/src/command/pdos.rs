@@ -4,6 +4,7 @@ use ringcat_control::tool::{Description, SyncManagerLine};
 
 use super::matlab;
 use super::slaves::description;
+use crate::append::append;
 use crate::failure::Failure;
 use crate::json;
 use crate::json::pdos::{Pdos, SubDevice};
@@ -82,13 +83,13 @@ fn listed(details: &Description) -> String {
 fn sync_manager((number, own): (u8, &SyncManagerLine)) -> String {
     let SyncManagerLine { start, length, control, enable, .. } = own;
     let mut text = format!("SM{number}: PhysAddr 0x{start:04x}, DefaultSize {length:>4}, ");
-    text += &format!("ControlRegister 0x{control:02x}, Enable {enable}\n");
+    append!(text, "ControlRegister 0x{control:02x}, Enable {enable}\n");
     let kind = if own.is_output { "RxPDO" } else { "TxPDO" };
     for pdo in &own.pdos {
-        text += &format!("  {kind} 0x{:04x} \"{}\"\n", pdo.index, pdo.name);
+        append!(text, "  {kind} 0x{:04x} \"{}\"\n", pdo.index, pdo.name);
         for entry in &pdo.entries {
             let (index, sub_index, bits) = (entry.index, entry.sub_index, entry.bits);
-            text += &format!("    PDO entry 0x{index:04x}:{sub_index:02x}, {bits:>2} bit, \"{}\"\n", entry.name);
+            append!(text, "    PDO entry 0x{index:04x}:{sub_index:02x}, {bits:>2} bit, \"{}\"\n", entry.name);
         }
     }
     text

@@ -3,6 +3,7 @@
 use ringcat_control::message::Query;
 
 use super::sii_image::{self, HEAD_WORDS, categories, category_name};
+use crate::append::append;
 use crate::failure::Failure;
 use crate::hex;
 use crate::json;
@@ -43,7 +44,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         return Err(corrupted());
     };
     for (category, data) in categories {
-        text += &format!("SII Category 0x{category:04x} ({}), {} words\n", category_name(category), data.len() / 2);
+        append!(text, "SII Category 0x{category:04x} ({}), {} words\n", category_name(category), data.len() / 2);
         text += &hex::trimmed_lines("  ", data);
     }
     session.write(text.as_bytes())

@@ -2,6 +2,7 @@
 
 use ringcat_control::tool::{ClockFeatures, Description, PortLine, PortsLine};
 
+use crate::append::append;
 use crate::json::details::{COE_DETAILS, Clock, FLAGS, PORT_KINDS, protocols};
 use crate::selection::Slave;
 
@@ -13,13 +14,13 @@ pub fn details(master: u32, slave: &Slave, details: &Description, has_clock: boo
     let line = &slave.line;
     let mut text = format!("=== Master {master}, Slave {} ===\n", line.position);
     if line.alias != 0 {
-        text += &format!("Alias: {}\n", line.alias);
+        append!(text, "Alias: {}\n", line.alias);
     }
     let device = if line.is_redundant { "Backup" } else { "Main" };
-    text += &format!("Device: {device}\nState: {}\nFlag: {}\nIdentity:\n", slave.state(), slave.flag());
+    append!(text, "Device: {device}\nState: {}\nFlag: {}\nIdentity:\n", slave.state(), slave.flag());
     let [vendor, product, revision, serial] = line.identity;
-    text += &format!("  Vendor Id:       0x{vendor:08x}\n  Product code:    0x{product:08x}\n");
-    text += &format!("  Revision number: 0x{revision:08x}\n  Serial number:   0x{serial:08x}\n");
+    append!(text, "  Vendor Id:       0x{vendor:08x}\n  Product code:    0x{product:08x}\n");
+    append!(text, "  Revision number: 0x{revision:08x}\n  Serial number:   0x{serial:08x}\n");
     text += &data_link(&details.features, has_clock, ports);
     text += &port_table(&details.features, ports);
     text += &mailboxes(details);
@@ -41,9 +42,9 @@ fn data_link(features: &ClockFeatures, has_clock: bool, ports: &PortsLine) -> St
         Clock::Bits32 => "yes, 32 bit",
     };
     let mut text = format!("DL information:\n  FMMU bit operation: {}\n", yes(features.fmmu_bytes));
-    text += &format!("  Distributed clocks: {clock}\n");
+    append!(text, "  Distributed clocks: {clock}\n");
     if features.dc {
-        text += &format!("  DC system time transmission delay: {} ns\n", ports.delay_ns);
+        append!(text, "  DC system time transmission delay: {} ns\n", ports.delay_ns);
     }
     text
 }
@@ -56,9 +57,9 @@ fn port_table(features: &ClockFeatures, ports: &PortsLine) -> String {
         text += &port_row(number, port);
         if features.dc && port.link[0] {
             let difference = port.received_ns.wrapping_sub(first);
-            text += &format!("  {:>11}  {difference:>10}  {:>10}", port.received_ns, port.delay_ns.unsigned_abs());
+            append!(text, "  {:>11}  {difference:>10}  {:>10}", port.received_ns, port.delay_ns.unsigned_abs());
         } else if features.dc {
-            text += &format!("  {:>11}  {:>10}  {:>10}", '-', '-', '-');
+            append!(text, "  {:>11}  {:>10}  {:>10}", '-', '-', '-');
         }
         text.push('\n');
     }
@@ -83,13 +84,13 @@ fn mailboxes(details: &Description) -> String {
         format!("RX: 0x{rx:04x}/{rx_bytes}, TX: 0x{tx:04x}/{tx_bytes}")
     };
     let mut text = format!("Mailboxes:\n  Bootstrap {}\n", both(details.bootstrap));
-    text += &format!("  Standard  {}\n  Supported protocols: {}\n", both(details.mailbox), names.join(", "));
+    append!(text, "  Standard  {}\n  Supported protocols: {}\n", both(details.mailbox), names.join(", "));
     text
 }
 
 fn general(slave: &Slave, details: &Description) -> String {
     let mut text = format!("General:\n  Group: {}\n  Image name: {}\n", details.group, details.image);
-    text += &format!("  Order number: {}\n  Device name: {}\n", slave.line.order, slave.line.name);
+    append!(text, "  Order number: {}\n  Device name: {}\n", slave.line.order, slave.line.name);
     let bits = |title: &str, names: &[&str], value: u8| {
         let line = |(bit, name): (usize, &&str)| format!("    {name}: {}\n", yes(value >> bit & 1 != 0));
         format!("  {title}:\n{}", names.iter().enumerate().map(line).collect::<String>())

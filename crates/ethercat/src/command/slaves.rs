@@ -7,6 +7,7 @@ use ringcat_control::tool::{Description, PortsLine, ToolAnswer, ToolQuery};
 
 use super::crc::{of_slave, ports};
 use super::slave_details::details;
+use crate::append::append;
 use crate::failure::{Failure, unexpected};
 use crate::json;
 use crate::json::details::Details;
@@ -145,11 +146,11 @@ fn table(indent: &str, slaves: &[Slave]) -> String {
     for (slave, [position, alias, relative, state]) in slaves.iter().zip(&rows) {
         // The ring is broken between these two.
         if last.is_some_and(|last| last != slave.line.is_redundant) {
-            text += &format!("{indent}xxx LINK FAILURE xxx\n");
+            append!(text, "{indent}xxx LINK FAILURE xxx\n");
         }
         last = Some(slave.line.is_redundant);
         let (flag, name) = (slave.flag(), slave.name());
-        text += &format!("{indent}{position:>a$}  {alias:>b$}:{relative:<c$}  {state:<d$}  {flag}  {name}\n");
+        append!(text, "{indent}{position:>a$}  {alias:>b$}:{relative:<c$}  {state:<d$}  {flag}  {name}\n");
     }
     text
 }

@@ -3,6 +3,7 @@
 use ringcat_control::tool::{Description, PdoEntryLine, PdoLine};
 
 use super::slaves::description;
+use crate::append::append;
 use crate::failure::Failure;
 use crate::json;
 use crate::json::texts::Text;
@@ -49,19 +50,19 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
 fn info(slave: &Slave, details: &Description) -> String {
     let [vendor, product, revision, _] = slave.line.identity;
     let mut text = format!("<EtherCATInfo>\n  <!-- Slave {} -->\n", slave.line.position);
-    text += &format!("  <Vendor>\n    <Id>{vendor}</Id>\n  </Vendor>\n");
+    append!(text, "  <Vendor>\n    <Id>{vendor}</Id>\n  </Vendor>\n");
     text += "  <Descriptions>\n    <Devices>\n      <Device>\n";
-    text += &format!("        <Type ProductCode=\"#x{product:08x}\" RevisionNo=\"#x{revision:08x}\"");
+    append!(text, "        <Type ProductCode=\"#x{product:08x}\" RevisionNo=\"#x{revision:08x}\"");
     text += &match slave.line.order.as_str() {
         "" => "/>\n".to_owned(),
         order => format!(">{}</Type>\n", escaped(order)),
     };
     if !slave.line.name.is_empty() {
-        text += &format!("        <Name><![CDATA[{}]]></Name>\n", character_data(&slave.line.name));
+        append!(text, "        <Name><![CDATA[{}]]></Name>\n", character_data(&slave.line.name));
     }
     for own in &details.sync_managers {
-        text += &format!("        <Sm Enable=\"{}\" StartAddress=\"#x{:x}\"", own.enable, own.start);
-        text += &format!(" ControlByte=\"#x{:x}\" DefaultSize=\"{}\" />\n", own.control, own.length);
+        append!(text, "        <Sm Enable=\"{}\" StartAddress=\"#x{:x}\"", own.enable, own.start);
+        append!(text, " ControlByte=\"#x{:x}\" DefaultSize=\"{}\" />\n", own.control, own.length);
     }
     for (number, own) in details.sync_managers.iter().enumerate() {
         let kind = if own.is_output { "RxPdo" } else { "TxPdo" };
@@ -72,7 +73,7 @@ fn info(slave: &Slave, details: &Description) -> String {
 
 fn pdo_element(kind: &str, number: usize, pdo: &PdoLine) -> String {
     let mut text = format!("        <{kind} Sm=\"{number}\" Fixed=\"1\" Mandatory=\"1\">\n");
-    text += &format!("          <Index>#x{:04x}</Index>\n          <Name>{}</Name>\n", pdo.index, escaped(&pdo.name));
+    append!(text, "          <Index>#x{:04x}</Index>\n          <Name>{}</Name>\n", pdo.index, escaped(&pdo.name));
     pdo.entries.iter().for_each(|entry| text += &entry_element(entry));
     text + &format!("        </{kind}>\n")
 }
@@ -81,16 +82,16 @@ fn entry_element(entry: &PdoEntryLine) -> String {
     let PdoEntryLine { index, sub_index, bits, name } = entry;
     let mut text = format!("          <Entry>\n            <Index>#x{index:04x}</Index>\n");
     if *index != 0 {
-        text += &format!("            <SubIndex>{sub_index}</SubIndex>\n");
+        append!(text, "            <SubIndex>{sub_index}</SubIndex>\n");
     }
-    text += &format!("            <BitLen>{bits}</BitLen>\n");
+    append!(text, "            <BitLen>{bits}</BitLen>\n");
     if *index != 0 {
         let data_type = match bits {
             1 => "BOOL".to_owned(),
             8 | 16 | 32 | 64 => format!("UINT{bits}"),
             _ => format!("BIT{bits}"),
         };
-        text += &format!("            <Name>{}</Name>\n            <DataType>{data_type}</DataType>\n", escaped(name));
+        append!(text, "            <Name>{}</Name>\n            <DataType>{data_type}</DataType>\n", escaped(name));
     }
     text + "          </Entry>\n"
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use ringcat_keys::{Table, check_keys, check_page, keys};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
-use super::{Line, config, domains, master, pdos, reads, ring, sdos, slaves, texts};
+use super::{config, domains, master, pdos, reads, ring, sdos, slaves, texts};
 use crate::commands::ALL;
 use crate::data_types::Scalar;
 use crate::shape::Output;
@@ -14,6 +14,16 @@ use crate::shape::Output;
 /// The line before the tables.
 const BEGIN: &str =
     "<!-- Written from crates/ethercat/src/json: RINGCAT_WRITE_JSON_KEYS=1 cargo test -p ringcat-ethercat keys -->\n";
+
+/// What [`super::print`] begins every line with.
+#[derive(JsonSchema)]
+#[allow(dead_code)]
+struct Head {
+    /// Version of the keys on this page
+    schema_version: u32,
+    /// The command that prints the line
+    command: &'static str,
+}
 
 impl JsonSchema for Scalar {
     fn schema_name() -> Cow<'static, str> {
@@ -28,7 +38,7 @@ impl JsonSchema for Scalar {
 /// All tables: a heading, and the keys.
 fn all() -> Vec<Table> {
     vec![
-        ("Every line", keys::<Line<'_, ()>>()),
+        ("Every line", keys::<Head>()),
         ("`clocks`", keys::<ring::Clocks>()),
         ("`config`", keys::<config::Config<'_>>()),
         ("`crc`", keys::<slaves::Crc<'_>>()),
