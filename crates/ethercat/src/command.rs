@@ -24,7 +24,6 @@ pub mod reg_write;
 pub mod rescan;
 pub mod ring;
 pub mod sdos;
-mod sii_image;
 pub mod sii_read;
 pub mod sii_write;
 mod slave_details;

@@ -8,11 +8,13 @@ pub fn listed(bytes: &[u8]) -> String {
     all.join(" ")
 }
 
-/// `0102ab`.
-pub fn digits(bytes: &[u8]) -> String {
+/// `0102ab` behind a text.
+pub fn put_digits(text: &mut String, bytes: &[u8]) {
     const DIGITS: &[u8; 16] = b"0123456789abcdef";
-    let digits = bytes.iter().flat_map(|byte| [byte >> 4, byte & 0x0F]);
-    digits.map(|digit| char::from(DIGITS[usize::from(digit)])).collect()
+    text.reserve(2 * bytes.len());
+    for digit in bytes.iter().flat_map(|byte| [byte >> 4, byte & 0x0F]) {
+        text.push(char::from(DIGITS[usize::from(digit)]));
+    }
 }
 
 /// `02:00:00:00:00:01`.
@@ -46,7 +48,10 @@ mod tests {
     #[test]
     fn bytes_are_listed_and_broken_into_lines() {
         assert_eq!((listed(&[1, 0xAB]), listed(&[])), ("0x01 0xab".to_owned(), String::new()));
-        assert_eq!((digits(&[1, 0xAB]), mac(&[2, 0, 0, 0, 0, 1])), ("01ab".to_owned(), "02:00:00:00:00:01".to_owned()));
+        assert_eq!(mac(&[2, 0, 0, 0, 0, 1]), "02:00:00:00:00:01");
+        let mut text = "=".to_owned();
+        put_digits(&mut text, &[1, 0xAB]);
+        assert_eq!(text, "=01ab");
         let bytes: Vec<u8> = (0..17).collect();
         let first = "  00 01 02 03 04 05 06 07 08 09 0a 0b 0c 0d 0e 0f";
         assert_eq!(lines("  ", &bytes), format!("{first} \n  10 \n"));

@@ -33,6 +33,7 @@ pub mod selection;
 pub mod selection_help;
 pub mod session;
 pub mod shape;
+mod sii_image;
 pub mod standalone;
 
 use std::ffi::OsString;

@@ -4,7 +4,7 @@ use ringcat_control::message::ClockSnapshot;
 
 use crate::failure::Failure;
 use crate::json;
-use crate::json::ring::{Clock, Clocks};
+use crate::json::ring::Clocks;
 use crate::session::Session;
 use crate::shape::{Command, Output};
 
@@ -32,7 +32,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         let number = master.master;
         let state = session.state(number)?;
         if session.arguments.json {
-            json::print(session, &Clocks { master: number, clocks: state.clocks.iter().map(Clock::new).collect() })?;
+            json::print(session, &Clocks::new(number, &state.clocks))?;
             continue;
         }
         if masters.len() > 1 {

@@ -5,7 +5,7 @@ use ringcat_control::tool::{DeclaredLine, MOST_DECLARED, Piece, ToolAnswer, Tool
 use super::config_details::details;
 use crate::failure::{Failure, unexpected};
 use crate::json;
-use crate::json::config::{Config, Declared};
+use crate::json::config::Config;
 use crate::selection::{self, Slave};
 use crate::session::Session;
 use crate::shape::{Command, Output};
@@ -43,8 +43,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         let lines = selection::declared(declared(session, number)?, aliases.as_ref(), positions.as_ref());
         let slaves = if lines.is_empty() { Vec::new() } else { session.all_slaves(number)? };
         if session.arguments.json {
-            let declared = lines.iter().map(|line| Declared::new(line, &slaves)).collect();
-            json::print(session, &Config { master: number, declared })?;
+            json::print(session, &Config::new(number, &lines, &slaves))?;
             continue;
         }
         if lines.is_empty() {

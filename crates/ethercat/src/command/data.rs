@@ -2,9 +2,8 @@
 
 use super::domains::selected;
 use crate::failure::Failure;
-use crate::hex;
 use crate::json;
-use crate::json::domains::{Data, Image};
+use crate::json::domains::Data;
 use crate::session::Session;
 use crate::shape::{Command, Output};
 
@@ -23,13 +22,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     for master in session.masters()? {
         let selected = selected(session, master.master)?;
         if session.arguments.json {
-            let image = |(domain, _, image): &(u32, _, Vec<u8>)| Image {
-                domain: *domain,
-                length_bytes: image.len(),
-                data: hex::digits(image),
-            };
-            let domains = selected.iter().map(image).collect();
-            json::print(session, &Data { master: master.master, domains })?;
+            json::print(session, &Data::new(master.master, &selected))?;
             continue;
         }
         for (_, _, image) in selected {

@@ -7,7 +7,7 @@ use crate::append::append;
 use crate::failure::{Failure, unexpected};
 use crate::hex;
 use crate::json;
-use crate::json::domains::{Domain, Domains, area_bytes};
+use crate::json::domains::{Domains, Selected, area_bytes};
 use crate::session::Session;
 use crate::shape::{Command, Output};
 
@@ -33,8 +33,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     for master in masters {
         let domains = selected(session, master.master)?;
         if session.arguments.json {
-            let listed = domains.iter().map(|(number, domain, image)| Domain::new(*number, domain, image));
-            json::print(session, &Domains { master: master.master, domains: listed.collect() })?;
+            json::print(session, &Domains::new(master.master, &domains))?;
             continue;
         }
         if is_several && !domains.is_empty() {
@@ -52,7 +51,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
 }
 
 /// The selected domains of a master: number, domain, image.
-pub(super) fn selected(session: &mut Session<'_>, master: u32) -> Result<Vec<(u32, DomainLine, Vec<u8>)>, Failure> {
+pub(super) fn selected(session: &mut Session<'_>, master: u32) -> Result<Vec<Selected>, Failure> {
     let list = session.list(session.arguments.domain.as_deref(), "domain")?;
     let (answer, images) = session.ask(master, Query::Tool(ToolQuery::Domains), Vec::new())?;
     let Answer::Tool(ToolAnswer::Domains(domains)) = answer else { return Err(unexpected()) };

@@ -5,7 +5,7 @@ use ringcat_control::tool::{EthernetLine, ToolAnswer, ToolQuery};
 use crate::append::append;
 use crate::failure::{Failure, unexpected};
 use crate::json;
-use crate::json::texts::{Ethernet, Interface};
+use crate::json::texts::Ethernet;
 use crate::session::Session;
 use crate::shape::{Command, Output};
 
@@ -28,8 +28,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         let answer = session.tool(master.master, ToolQuery::Ethernet)?;
         let ToolAnswer::Ethernet(lines) = answer else { return Err(unexpected()) };
         if session.arguments.json {
-            let interfaces = lines.iter().map(Interface::new).collect();
-            json::print(session, &Ethernet { master: master.master, interfaces })?;
+            json::print(session, &Ethernet::new(master.master, &lines))?;
         } else if !lines.is_empty() {
             session.write(table(master.master, &lines).as_bytes())?;
         }

@@ -6,9 +6,9 @@ use ringcat_control::tool::ToolQuery;
 
 use crate::aborts::of_foe;
 use crate::failure::Failure;
-use crate::hex;
 use crate::json;
 use crate::json::reads::File;
+use crate::json::values::Hex;
 use crate::session::Session;
 use crate::shape::{Command, Output};
 
@@ -43,7 +43,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     }
     match local {
         _ if session.arguments.json => {
-            let data = local.is_none().then(|| hex::digits(&bytes));
+            let data = local.is_none().then_some(Hex(&bytes));
             json::print(session, &File { master, position, file: &file, length_bytes: bytes.len(), data })
         }
         Some(_) => Ok(()),

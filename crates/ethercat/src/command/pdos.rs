@@ -7,7 +7,7 @@ use super::slaves::description;
 use crate::append::append;
 use crate::failure::Failure;
 use crate::json;
-use crate::json::pdos::{Pdos, SubDevice};
+use crate::json::pdos::Pdos;
 use crate::selection::Slave;
 use crate::session::Session;
 use crate::shape::{Command, Output};
@@ -71,9 +71,8 @@ fn print_json(session: &mut Session<'_>, master: u32, slaves: &[Slave]) -> Resul
         let position = slave.line.position;
         all.push((position, description(session, master, position)?));
     }
-    let has_any = |(_, details): &&(u16, Description)| !details.sync_managers.is_empty();
-    let listed = all.iter().filter(has_any).map(|(position, details)| SubDevice::new(*position, details));
-    json::print(session, &Pdos { master, subdevices: listed.collect() })
+    all.retain(|(_, details)| !details.sync_managers.is_empty());
+    json::print(session, &Pdos::new(master, &all))
 }
 
 fn listed(details: &Description) -> String {

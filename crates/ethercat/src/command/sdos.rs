@@ -7,7 +7,7 @@ use super::slaves::description;
 use crate::data_types;
 use crate::failure::{Failure, unexpected};
 use crate::json;
-use crate::json::sdos::{Object, Sdos};
+use crate::json::sdos::Sdos;
 use crate::session::Session;
 use crate::shape::{Command, Output};
 
@@ -98,8 +98,7 @@ fn print_json(session: &mut Session<'_>, master: u32, position: u16) -> Result<(
         Ok(())
     })?;
     let has_entries = !session.arguments.quiet;
-    let objects = all.iter().map(|(index, object)| Object::new(*index, object, has_entries)).collect();
-    json::print(session, &Sdos { master, position, objects })
+    json::print(session, &Sdos::new(master, position, &all, has_entries))
 }
 
 /// A name of a dictionary, which holds what the SubDevice sends: one line, and nothing that a terminal obeys.

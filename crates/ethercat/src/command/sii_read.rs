@@ -2,14 +2,14 @@
 
 use ringcat_control::message::Query;
 
-use super::sii_image::{self, HEAD_WORDS, categories, category_name};
 use crate::append::append;
 use crate::failure::Failure;
 use crate::hex;
 use crate::json;
-use crate::json::reads::{Category, Sii};
+use crate::json::reads::Sii;
 use crate::session::Session;
 use crate::shape::{Command, Output};
+use crate::sii_image::{HEAD_WORDS, categories, category_name};
 
 /// The command.
 pub const COMMAND: Command = Command {
@@ -31,7 +31,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     if session.arguments.json {
         let found = categories(&image);
         let is_refused = session.arguments.verbose && found.is_none();
-        json::print(session, &sii(master, position, &image, found))?;
+        json::print(session, &Sii::new(master, position, &image, found.as_deref()))?;
         return if is_refused { Err(corrupted()) } else { Ok(()) };
     }
     if !session.arguments.verbose {
@@ -48,13 +48,4 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         text += &hex::trimmed_lines("  ", data);
     }
     session.write(text.as_bytes())
-}
-
-fn sii(master: u32, position: u16, image: &[u8], categories: Option<Vec<sii_image::Category<'_>>>) -> Sii {
-    let category = |(category, data): (u16, &[u8])| {
-        let (name, data) = (category_name(category), hex::digits(data));
-        Category { category, name, data }
-    };
-    let categories = categories.map(|found| found.into_iter().map(category).collect());
-    Sii { master, position, length_bytes: image.len(), categories, data: hex::digits(image) }
 }

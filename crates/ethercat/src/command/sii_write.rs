@@ -2,11 +2,11 @@
 
 use ringcat_control::tool::ToolQuery;
 
-use super::sii_image::{FEWEST_WORDS, HEAD_WORDS, categories, wrong_checksum};
 use crate::failure::Failure;
 use crate::inputs;
 use crate::session::Session;
 use crate::shape::{Command, Output};
+use crate::sii_image::{FEWEST_WORDS, HEAD_WORDS, categories, wrong_checksum};
 
 /// Most bytes of an image.
 const MOST: usize = 64 << 10;

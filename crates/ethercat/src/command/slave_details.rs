@@ -75,7 +75,7 @@ fn port_row(number: usize, port: &PortLine) -> String {
 }
 
 fn mailboxes(details: &Description) -> String {
-    let names = protocols(details);
+    let names: Vec<&str> = protocols(details).set().collect();
     if names.is_empty() {
         return String::new();
     }

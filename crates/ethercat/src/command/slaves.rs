@@ -5,13 +5,13 @@ use ringcat_control::message::Query;
 use ringcat_control::refusal::Refusal;
 use ringcat_control::tool::{Description, PortsLine, ToolAnswer, ToolQuery};
 
-use super::crc::{of_slave, ports};
+use super::crc::ports;
 use super::slave_details::details;
 use crate::append::append;
 use crate::failure::{Failure, unexpected};
 use crate::json;
-use crate::json::details::Details;
-use crate::json::slaves::{Slaves, SubDevice};
+use crate::json::details::Known;
+use crate::json::slaves::{Slaves, of_slave};
 use crate::selection::Slave;
 use crate::session::Session;
 use crate::shape::{Command, Output};
@@ -86,19 +86,7 @@ fn print_json(session: &mut Session<'_>, master: u32, slaves: &[Slave]) -> Resul
             all.push(known(session, master, slave, &ports)?);
         }
     }
-    let of = |(at, slave)| {
-        let known: Option<&Known> = all.get(at);
-        SubDevice::new(slave, known.map(|it| Details::new(&it.description, it.has_clock, &it.ports)))
-    };
-    let subdevices = slaves.iter().enumerate().map(of).collect();
-    json::print(session, &Slaves { master, subdevices })
-}
-
-/// What is known of a SubDevice beside its line.
-struct Known {
-    description: Description,
-    has_clock: bool,
-    ports: PortsLine,
+    json::print(session, &Slaves::new(master, slaves, &all))
 }
 
 fn known(session: &mut Session<'_>, master: u32, slave: &Slave, ports: &[PortsLine]) -> Result<Known, Failure> {

@@ -2,11 +2,11 @@
 
 use std::net::Ipv4Addr;
 
-use ringcat_control::tool::{DeclaredLine, DeclaredSyncManager, IpParameters, SyncLine};
+use ringcat_control::tool::{DeclaredLine, DeclaredSyncManager, IdnLine, IpParameters, SdoLine, SyncLine};
 use serde::Serialize;
 
-use super::pdos::{Pdo, pdos};
-use super::values::{Direction, state};
+use super::pdos::{PdoList, pdos};
+use super::values::{Direction, Hex, List, state};
 use crate::hex;
 use crate::selection::Slave;
 
@@ -17,7 +17,7 @@ pub struct Config<'a> {
     /// Number of the master
     pub master: u32,
     /// The selected SubDevices that the active application has declared, by alias and position; none without one
-    pub declared: Vec<Declared<'a>>,
+    pub declared: List<'a, DeclaredLine, &'a [Slave], Declared<'a>>,
 }
 
 /// A declared SubDevice.
@@ -39,11 +39,11 @@ pub struct Declared<'a> {
     /// Intervals of the watchdog of process data, register 0x0420; null where they are not written
     pub watchdog_intervals: Option<u16>,
     /// SyncManagers with PDOs, or with settings of their own
-    pub sync_managers: Vec<SyncManager<'a>>,
+    pub sync_managers: List<'a, DeclaredSyncManager, (), SyncManager<'a>>,
     /// SDOs that are written at each start
-    pub sdos: Vec<Sdo>,
+    pub sdos: List<'a, SdoLine, (), Sdo<'a>>,
     /// IDNs that are written at each start
-    pub idns: Vec<Idn>,
+    pub idns: List<'a, IdnLine, (), Idn<'a>>,
     /// Whether the EEPROM is assigned to the PDI
     pub sii_to_pdi: bool,
     /// Pause in PREOP before SAFEOP, in milliseconds
@@ -77,13 +77,13 @@ pub struct SyncManager<'a> {
     /// Whether its watchdog is enabled; null: as the SII says
     pub watchdog: Option<bool>,
     /// Its PDOs
-    pub pdos: Vec<Pdo<'a>>,
+    pub pdos: PdoList<'a>,
 }
 
 /// An SDO that is written at each start.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct Sdo {
+pub struct Sdo<'a> {
     /// Index of the object
     pub index: u16,
     /// Sub-index of the entry; null: the whole object, by complete access
@@ -91,13 +91,13 @@ pub struct Sdo {
     /// Length of all data, in bytes
     pub length_bytes: u32,
     /// The first 1,024 of these bytes, in hexadecimal digits
-    pub data: String,
+    pub data: Hex<'a>,
 }
 
 /// An IDN that is written at each start.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct Idn {
+pub struct Idn<'a> {
     /// Drive behind the SubDevice, 0 to 7
     pub drive: u8,
     /// Number of the IDN; bit 15: it is specific to the product (`P`)
@@ -105,7 +105,7 @@ pub struct Idn {
     /// Length of all data, in bytes
     pub length_bytes: u32,
     /// The first 1,024 of these bytes, in hexadecimal digits
-    pub data: String,
+    pub data: Hex<'a>,
 }
 
 /// IP parameters.
@@ -142,22 +142,16 @@ pub struct Sync {
     pub sync1_shift_ns: i32,
 }
 
+impl<'a> Config<'a> {
+    /// What is declared, and the SubDevices on the bus.
+    pub fn new(master: u32, all: &'a [DeclaredLine], slaves: &'a [Slave]) -> Config<'a> {
+        Config { master, declared: List { all, context: slaves, make: Declared::new } }
+    }
+}
+
 impl<'a> Declared<'a> {
-    /// A declared SubDevice, and where it is among those on the bus.
-    pub fn new(line: &'a DeclaredLine, slaves: &[Slave]) -> Declared<'a> {
+    fn new(_: usize, line: &'a DeclaredLine, slaves: &'a [Slave]) -> Declared<'a> {
         let ([vendor_id, product_code], [watchdog_divider, watchdog_intervals]) = (line.identity, line.watchdog);
-        let sdos = line.sdos.iter().map(|sdo| Sdo {
-            index: sdo.index,
-            subindex: sdo.sub_index,
-            length_bytes: sdo.length,
-            data: hex::digits(&sdo.data),
-        });
-        let idns = line.idns.iter().map(|idn| Idn {
-            drive: idn.drive,
-            idn: idn.idn,
-            length_bytes: idn.length,
-            data: hex::digits(&idn.data),
-        });
         Declared {
             alias: line.alias,
             position: line.position,
@@ -166,9 +160,9 @@ impl<'a> Declared<'a> {
             attached: line.found.map(|position| attached(position, slaves)),
             watchdog_divider,
             watchdog_intervals,
-            sync_managers: line.sync_managers.iter().map(sync_manager).collect(),
-            sdos: sdos.collect(),
-            idns: idns.collect(),
+            sync_managers: List { all: &line.sync_managers, context: (), make: sync_manager },
+            sdos: List { all: &line.sdos, context: (), make: sdo },
+            idns: List { all: &line.idns, context: (), make: idn },
             sii_to_pdi: line.sii_to_pdi,
             wait_before_safeop_ms: line.wait_before_safeop_ms,
             ip: line.ip.as_ref().map(ip),
@@ -183,7 +177,15 @@ fn attached(position: u16, slaves: &[Slave]) -> Attached {
     Attached { position, state: state(status), error: slave.is_none_or(Slave::has_error) }
 }
 
-fn sync_manager(own: &DeclaredSyncManager) -> SyncManager<'_> {
+fn sdo(_: usize, line: &SdoLine, _: ()) -> Sdo<'_> {
+    Sdo { index: line.index, subindex: line.sub_index, length_bytes: line.length, data: Hex(&line.data) }
+}
+
+fn idn(_: usize, line: &IdnLine, _: ()) -> Idn<'_> {
+    Idn { drive: line.drive, idn: line.idn, length_bytes: line.length, data: Hex(&line.data) }
+}
+
+fn sync_manager(_: usize, own: &DeclaredSyncManager, _: ()) -> SyncManager<'_> {
     SyncManager {
         sync_manager: own.index,
         direction: Direction::of(own.is_output),
@@ -228,7 +230,7 @@ mod tests {
     #[test]
     fn a_declared_subdevice_that_does_not_answer_has_no_state() {
         let line = DeclaredLine { found: Some(3), ..DeclaredLine::default() };
-        let attached = Declared::new(&line, &[]).attached.expect("it was found");
+        let attached = Declared::new(0, &line, &[]).attached.expect("it was found");
         assert_eq!((attached.position, attached.state, attached.error), (3, None, true));
     }
 }

@@ -3,6 +3,8 @@
 use ringcat_control::tool::{ClockFeatures, Description, PortLine, PortsLine};
 use serde::Serialize;
 
+use super::values::Bits;
+
 /// Kinds of ports.
 pub const PORT_KINDS: [&str; 4] = ["N/A", "N/C", "EBUS", "MII"];
 /// Mailbox protocols by bit.
@@ -19,14 +21,19 @@ pub const COE_DETAILS: [&str; 6] = [
 /// Flags by bit.
 pub const FLAGS: [&str; 2] = ["Enable SafeOp", "Enable notLRW"];
 
-/// Names of the bits that are set.
-fn set(names: &[&'static str], bits: u16) -> Vec<&'static str> {
-    (0..).zip(names).filter(|(bit, _)| bits >> bit & 1 != 0).map(|(_, name)| *name).collect()
+/// Names of mailbox protocols.
+pub fn protocols(details: &Description) -> Bits {
+    Bits { names: &PROTOCOLS, bits: details.protocols }
 }
 
-/// Names of mailbox protocols.
-pub fn protocols(details: &Description) -> Vec<&'static str> {
-    set(&PROTOCOLS, details.protocols)
+/// What is known of a SubDevice beside its line in a list.
+pub struct Known {
+    /// Its SII and its controller.
+    pub description: Description,
+    /// Its controller has a register of the system time.
+    pub has_clock: bool,
+    /// Its ports.
+    pub ports: PortsLine,
 }
 
 /// The clock of a controller.
@@ -67,9 +74,9 @@ pub struct Details<'a> {
     /// Propagation delay from the reference clock, in nanoseconds, 0 while it is not known; null where none is measured
     pub delay_ns: Option<i64>,
     /// Its four ports
-    pub ports: Vec<Port>,
+    pub ports: [Port; 4],
     /// Mailbox protocols: `AoE`, `EoE`, `CoE`, `FoE`, `SoE`, `VoE`
-    pub protocols: Vec<&'static str>,
+    pub protocols: Bits,
     /// Mailboxes in BOOT; null where its SII has none
     pub bootstrap_mailboxes: Option<Mailboxes>,
     /// Mailboxes in the other states; null where its SII has none
@@ -129,29 +136,30 @@ pub struct General<'a> {
     /// Name of its image
     pub image: &'a str,
     /// CoE details that are enabled, by their names in the text
-    pub coe_details: Vec<&'static str>,
+    pub coe_details: Bits,
     /// Flags that are set, by their names in the text
-    pub flags: Vec<&'static str>,
+    pub flags: Bits,
     /// Current from the EBUS in milliamperes; negative: it supplies current
     pub current_ma: i16,
 }
 
 impl<'a> Details<'a> {
     /// Those of a SubDevice.
-    pub fn new(details: &'a Description, has_clock: bool, ports: &PortsLine) -> Details<'a> {
+    pub fn new(known: &'a Known) -> Details<'a> {
+        let Known { description: details, has_clock, ports } = known;
         let features = &details.features;
         let general = || General {
             group: &details.group,
             image: &details.image,
-            coe_details: set(&COE_DETAILS, details.coe.into()),
-            flags: set(&FLAGS, details.flags.into()),
+            coe_details: Bits { names: &COE_DETAILS, bits: details.coe.into() },
+            flags: Bits { names: &FLAGS, bits: details.flags.into() },
             current_ma: details.current_ma,
         };
         Details {
             fmmu_bit_operation: features.fmmu_bytes,
-            clock: Clock::of(features, has_clock),
+            clock: Clock::of(features, *has_clock),
             delay_ns: features.dc.then_some(ports.delay_ns),
-            ports: ports.ports.iter().enumerate().map(|(number, line)| port(number, line, features.dc)).collect(),
+            ports: [0, 1, 2, 3].map(|number| port(number, &ports.ports[number], features.dc)),
             protocols: protocols(details),
             bootstrap_mailboxes: details.bootstrap.map(Mailboxes::of),
             mailboxes: details.mailbox.map(Mailboxes::of),

@@ -6,6 +6,7 @@ use std::path::Path;
 use ringcat_keys::{Table, check_keys, check_page, keys};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
+use super::values::{Bits, Hex, List};
 use super::{config, domains, master, pdos, reads, ring, sdos, slaves, texts};
 use crate::commands::ALL;
 use crate::data_types::Scalar;
@@ -23,6 +24,36 @@ struct Head {
     schema_version: u32,
     /// The command that prints the line
     command: &'static str,
+}
+
+impl<S, C, R: JsonSchema> JsonSchema for List<'_, S, C, R> {
+    fn schema_name() -> Cow<'static, str> {
+        Vec::<R>::schema_name()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        Vec::<R>::json_schema(generator)
+    }
+}
+
+impl JsonSchema for Bits {
+    fn schema_name() -> Cow<'static, str> {
+        "Bits".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        Vec::<&str>::json_schema(generator)
+    }
+}
+
+impl JsonSchema for Hex<'_> {
+    fn schema_name() -> Cow<'static, str> {
+        "Hex".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        <&str>::json_schema(generator)
+    }
 }
 
 impl JsonSchema for Scalar {

@@ -3,7 +3,7 @@
 use ringcat_control::tool::{Description, PdoEntryLine, PdoLine, SyncManagerLine};
 use serde::Serialize;
 
-use super::values::Direction;
+use super::values::{Direction, List};
 
 /// SyncManagers of a master's SubDevices.
 #[derive(Serialize)]
@@ -12,7 +12,7 @@ pub struct Pdos<'a> {
     /// Number of the master
     pub master: u32,
     /// The selected SubDevices that have SyncManagers, in the order of their positions
-    pub subdevices: Vec<SubDevice<'a>>,
+    pub subdevices: List<'a, (u16, Description), (), SubDevice<'a>>,
 }
 
 /// SyncManagers of a SubDevice.
@@ -22,7 +22,7 @@ pub struct SubDevice<'a> {
     /// Position on the bus, from 0
     pub position: u16,
     /// Its SyncManagers, from SM 0 on
-    pub sync_managers: Vec<SyncManager<'a>>,
+    pub sync_managers: List<'a, SyncManagerLine, (), SyncManager<'a>>,
 }
 
 /// A SyncManager.
@@ -42,7 +42,7 @@ pub struct SyncManager<'a> {
     /// `outputs` if the MainDevice writes it, `inputs` if it reads it
     pub direction: Direction,
     /// The PDOs that are assigned to it
-    pub pdos: Vec<Pdo<'a>>,
+    pub pdos: PdoList<'a>,
 }
 
 /// A PDO.
@@ -54,7 +54,7 @@ pub struct Pdo<'a> {
     /// Its name; empty where it has none
     pub name: &'a str,
     /// Its entries
-    pub entries: Vec<Entry<'a>>,
+    pub entries: List<'a, PdoEntryLine, (), Entry<'a>>,
 }
 
 /// An entry of a PDO.
@@ -71,14 +71,22 @@ pub struct Entry<'a> {
     pub name: &'a str,
 }
 
-impl<'a> SubDevice<'a> {
-    /// A SubDevice with its SyncManagers.
-    pub fn new(position: u16, details: &'a Description) -> SubDevice<'a> {
-        SubDevice { position, sync_managers: details.sync_managers.iter().enumerate().map(sync_manager).collect() }
+/// PDOs.
+pub type PdoList<'a> = List<'a, PdoLine, (), Pdo<'a>>;
+
+impl<'a> Pdos<'a> {
+    /// SubDevices by position.
+    pub fn new(master: u32, all: &'a [(u16, Description)]) -> Pdos<'a> {
+        Pdos { master, subdevices: List { all, context: (), make: subdevice } }
     }
 }
 
-fn sync_manager((sync_manager, line): (usize, &SyncManagerLine)) -> SyncManager<'_> {
+fn subdevice<'a>(_: usize, (position, details): &'a (u16, Description), _: ()) -> SubDevice<'a> {
+    let all = &details.sync_managers[..];
+    SubDevice { position: *position, sync_managers: List { all, context: (), make: sync_manager } }
+}
+
+fn sync_manager(sync_manager: usize, line: &SyncManagerLine, _: ()) -> SyncManager<'_> {
     SyncManager {
         sync_manager,
         start_address: line.start,
@@ -91,14 +99,14 @@ fn sync_manager((sync_manager, line): (usize, &SyncManagerLine)) -> SyncManager<
 }
 
 /// PDOs with their entries.
-pub fn pdos(lines: &[PdoLine]) -> Vec<Pdo<'_>> {
-    lines.iter().map(pdo).collect()
+pub fn pdos(all: &[PdoLine]) -> PdoList<'_> {
+    List { all, context: (), make: pdo }
 }
 
-fn pdo(line: &PdoLine) -> Pdo<'_> {
-    Pdo { index: line.index, name: &line.name, entries: line.entries.iter().map(entry).collect() }
+fn pdo(_: usize, line: &PdoLine, _: ()) -> Pdo<'_> {
+    Pdo { index: line.index, name: &line.name, entries: List { all: &line.entries, context: (), make: entry } }
 }
 
-fn entry(line: &PdoEntryLine) -> Entry<'_> {
+fn entry(_: usize, line: &PdoEntryLine, _: ()) -> Entry<'_> {
     Entry { index: line.index, subindex: line.sub_index, length_bits: line.bits, name: &line.name }
 }

@@ -3,35 +3,36 @@
 
 use serde::Serialize;
 
+use super::values::{Hex, List};
 use crate::data_types::{DataType, Scalar};
 use crate::failure::Failure;
-use crate::hex;
+use crate::sii_image::{Category as Found, category_name};
 
 /// A value as its data type tells it.
-pub struct Value {
+pub struct Value<'a> {
     /// Name of the data type.
     pub data_type: Option<&'static str>,
     /// The value.
     pub value: Scalar,
     /// Its bytes in hexadecimal digits.
-    pub data: String,
+    pub data: Hex<'a>,
 }
 
-impl Value {
+impl<'a> Value<'a> {
     /// The value of these bytes.
     ///
     /// # Errors
     /// They have another size than the data type.
-    pub fn new(data_type: Option<DataType>, bytes: &[u8]) -> Result<Value, Failure> {
+    pub fn new(data_type: Option<DataType>, bytes: &'a [u8]) -> Result<Value<'a>, Failure> {
         let value = data_type.map_or(Ok(Scalar::Nothing), |it| it.value(bytes))?;
-        Ok(Value { data_type: data_type.map(|it| it.name), value, data: hex::digits(bytes) })
+        Ok(Value { data_type: data_type.map(|it| it.name), value, data: Hex(bytes) })
     }
 }
 
 /// An entry of an object.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct Upload {
+pub struct Upload<'a> {
     /// Number of the master
     pub master: u32,
     /// Position of the SubDevice on the bus, from 0
@@ -46,13 +47,13 @@ pub struct Upload {
     /// finite number or no UTF-8
     pub value: Scalar,
     /// Its bytes as they are, in hexadecimal digits
-    pub data: String,
+    pub data: Hex<'a>,
 }
 
 /// Registers.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct Registers {
+pub struct Registers<'a> {
     /// Number of the master
     pub master: u32,
     /// Position of the SubDevice on the bus, from 0
@@ -65,13 +66,13 @@ pub struct Registers {
     /// finite number or no UTF-8
     pub value: Scalar,
     /// Its bytes as they are, in hexadecimal digits
-    pub data: String,
+    pub data: Hex<'a>,
 }
 
 /// An IDN.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct Idn {
+pub struct Idn<'a> {
     /// Number of the master
     pub master: u32,
     /// Position of the SubDevice on the bus, from 0
@@ -86,13 +87,13 @@ pub struct Idn {
     /// finite number or no UTF-8
     pub value: Scalar,
     /// Its bytes as they are, in hexadecimal digits
-    pub data: String,
+    pub data: Hex<'a>,
 }
 
 /// An SII.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct Sii {
+pub struct Sii<'a> {
     /// Number of the master
     pub master: u32,
     /// Position of the SubDevice on the bus, from 0
@@ -100,21 +101,33 @@ pub struct Sii {
     /// Length of the SII, in bytes
     pub length_bytes: usize,
     /// Its categories, in their order; null where they do not end within the SII
-    pub categories: Option<Vec<Category>>,
+    pub categories: Option<List<'a, Found<'a>, (), Category<'a>>>,
     /// The whole SII, in hexadecimal digits
-    pub data: String,
+    pub data: Hex<'a>,
 }
 
 /// A category of an SII.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct Category {
+pub struct Category<'a> {
     /// Number of the category
     pub category: u16,
     /// Its name in the text, such as `TXPDO`; `unknown` for those that the tool does not know
     pub name: &'static str,
     /// Its bytes without number and length, in hexadecimal digits
-    pub data: String,
+    pub data: Hex<'a>,
+}
+
+impl<'a> Sii<'a> {
+    /// An image, with its categories where they end within it.
+    pub fn new(master: u32, position: u16, image: &'a [u8], categories: Option<&'a [Found<'a>]>) -> Sii<'a> {
+        let categories = categories.map(|all| List { all, context: (), make: category });
+        Sii { master, position, length_bytes: image.len(), categories, data: Hex(image) }
+    }
+}
+
+fn category<'a>(_: usize, (category, data): &Found<'a>, _: ()) -> Category<'a> {
+    Category { category: *category, name: category_name(*category), data: Hex(data) }
 }
 
 /// A file.
@@ -130,5 +143,5 @@ pub struct File<'a> {
     /// Its length, in bytes
     pub length_bytes: usize,
     /// Its bytes, in hexadecimal digits; null where --output-file names a file for them
-    pub data: Option<String>,
+    pub data: Option<Hex<'a>>,
 }

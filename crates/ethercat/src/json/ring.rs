@@ -3,12 +3,12 @@
 use ringcat_control::message::{CableSnapshot, ClockSnapshot, EventLine, Snapshot};
 use serde::Serialize;
 
-use super::values::Link;
+use super::values::{Link, List};
 
 /// The ring of a master.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct Ring {
+pub struct Ring<'a> {
     /// Number of the master
     pub master: u32,
     /// Whether the ring is closed; null with one link, and while it is not known
@@ -20,7 +20,7 @@ pub struct Ring {
     /// The cable that is broken; null without a break, and while its place is not known
     pub line_break: Option<Cable>,
     /// Every cable with the errors at both its ends, while an application is active; empty without one
-    pub cables: Vec<CableErrors>,
+    pub cables: List<'a, CableSnapshot, (), CableErrors>,
 }
 
 /// A link.
@@ -69,9 +69,9 @@ pub struct CableEnd {
     pub port: u8,
 }
 
-impl Ring {
+impl<'a> Ring<'a> {
     /// The ring of a master with this number of links, and SubDevices on each.
-    pub fn new(master: u32, state: &Snapshot, counts: [u16; 2], links: usize) -> Ring {
+    pub fn new(master: u32, state: &'a Snapshot, counts: [u16; 2], links: usize) -> Ring<'a> {
         let ring = &state.ring;
         let is_ring = links >= Link::BOTH.len();
         let seen = Link::BOTH.into_iter().zip(&ring.links).zip(counts).take(links);
@@ -82,7 +82,7 @@ impl Ring {
             redundant: ring.redundant.filter(|_| is_ring),
             links: answering.collect(),
             line_break: ring.break_at.as_ref().map(|cable| Cable { near: end(cable.near), far: end(cable.far) }),
-            cables: state.cables.iter().map(errors).collect(),
+            cables: List { all: &state.cables, context: (), make: errors },
         }
     }
 }
@@ -91,7 +91,7 @@ fn end(port: Option<(usize, u8)>) -> Option<CableEnd> {
     port.map(|(position, port)| CableEnd { position, port })
 }
 
-fn errors(cable: &CableSnapshot) -> CableErrors {
+fn errors(_: usize, cable: &CableSnapshot, _: ()) -> CableErrors {
     let [damaged_frames, lost_links] = cable.errors;
     CableErrors { near: end(cable.near), far: end(cable.far), damaged_frames, lost_links }
 }
@@ -99,11 +99,11 @@ fn errors(cable: &CableSnapshot) -> CableErrors {
 /// The clocks of a master.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct Clocks {
+pub struct Clocks<'a> {
     /// Number of the master
     pub master: u32,
     /// The distributed clocks; empty where no application uses them
-    pub clocks: Vec<Clock>,
+    pub clocks: List<'a, ClockSnapshot, (), Clock>,
 }
 
 /// A clock.
@@ -126,9 +126,15 @@ pub struct Clock {
     pub locked: bool,
 }
 
+impl<'a> Clocks<'a> {
+    /// The clocks of a master.
+    pub fn new(master: u32, all: &'a [ClockSnapshot]) -> Clocks<'a> {
+        Clocks { master, clocks: List { all, context: (), make: Clock::new } }
+    }
+}
+
 impl Clock {
-    /// A clock.
-    pub fn new(clock: &ClockSnapshot) -> Clock {
+    fn new(_: usize, clock: &ClockSnapshot, _: ()) -> Clock {
         Clock {
             position: clock.position,
             delay_ns: clock.delay_ns,

@@ -3,6 +3,7 @@
 use ringcat_control::tool::{EntryLine, ObjectLine};
 use serde::Serialize;
 
+use super::values::{Bits, List};
 use crate::data_types;
 
 /// States in the order of the bits of access rights.
@@ -17,7 +18,7 @@ pub struct Sdos<'a> {
     /// Position of the SubDevice on the bus, from 0
     pub position: u16,
     /// Its objects; none without SDO information
-    pub objects: Vec<Object<'a>>,
+    pub objects: List<'a, (u16, ObjectLine), bool, Object<'a>>,
 }
 
 /// An object.
@@ -29,7 +30,7 @@ pub struct Object<'a> {
     /// Its name, as the SubDevice tells it
     pub name: &'a str,
     /// Its entries; null with --quiet
-    pub entries: Option<Vec<Entry<'a>>>,
+    pub entries: Option<List<'a, EntryLine, (), Entry<'a>>>,
 }
 
 /// An entry of an object.
@@ -45,34 +46,34 @@ pub struct Entry<'a> {
     /// Length, in bits
     pub length_bits: u16,
     /// States in which it can be read: `PREOP`, `SAFEOP`, `OP`
-    pub read_in: Vec<&'static str>,
+    pub read_in: Bits,
     /// States in which it can be written
-    pub write_in: Vec<&'static str>,
+    pub write_in: Bits,
     /// Its name, as the SubDevice tells it
     pub name: &'a str,
 }
 
-impl<'a> Object<'a> {
-    /// An object, with its entries or without.
-    pub fn new(index: u16, line: &'a ObjectLine, has_entries: bool) -> Object<'a> {
-        let entries = has_entries.then(|| line.entries.iter().map(entry).collect());
-        Object { index, name: &line.name, entries }
+impl<'a> Sdos<'a> {
+    /// Objects by index, with their entries or without.
+    pub fn new(master: u32, position: u16, all: &'a [(u16, ObjectLine)], has_entries: bool) -> Sdos<'a> {
+        Sdos { master, position, objects: List { all, context: has_entries, make: object } }
     }
 }
 
-fn entry(line: &EntryLine) -> Entry<'_> {
-    // Read in bits 0 to 2, write in bits 3 to 5.
-    let states = |first: u16| {
-        let allowed = (first..).zip(STATES).filter(|(bit, _)| line.access >> bit & 1 != 0);
-        allowed.map(|(_, state)| state).collect()
-    };
+fn object<'a>(_: usize, (index, line): &'a (u16, ObjectLine), has_entries: bool) -> Object<'a> {
+    let entries = List { all: &line.entries[..], context: (), make: entry };
+    Object { index: *index, name: &line.name, entries: has_entries.then_some(entries) }
+}
+
+fn entry(_: usize, line: &EntryLine, _: ()) -> Entry<'_> {
     Entry {
         subindex: line.sub_index,
         data_type: data_types::coded(line.data_type).map(|it| it.name),
         data_type_code: line.data_type,
         length_bits: line.bits,
-        read_in: states(0),
-        write_in: states(3),
+        // Read in bits 0 to 2, write in bits 3 to 5.
+        read_in: Bits { names: &STATES, bits: line.access },
+        write_in: Bits { names: &STATES, bits: line.access >> 3 },
         name: &line.name,
     }
 }

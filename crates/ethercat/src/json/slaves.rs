@@ -3,8 +3,8 @@
 use ringcat_control::tool::{PortLine, PortsLine};
 use serde::Serialize;
 
-use super::details::Details;
-use super::values::{Link, state};
+use super::details::{Details, Known};
+use super::values::{Link, List, state};
 use crate::selection::Slave;
 
 /// SubDevices of a master.
@@ -14,7 +14,7 @@ pub struct Slaves<'a> {
     /// Number of the master
     pub master: u32,
     /// The selected SubDevices, in the order of their positions
-    pub subdevices: Vec<SubDevice<'a>>,
+    pub subdevices: List<'a, Slave, &'a [Known], SubDevice<'a>>,
 }
 
 /// A SubDevice.
@@ -53,9 +53,15 @@ pub struct SubDevice<'a> {
     pub details: Option<Details<'a>>,
 }
 
+impl<'a> Slaves<'a> {
+    /// SubDevices, with what else is known of them or without.
+    pub fn new(master: u32, slaves: &'a [Slave], known: &'a [Known]) -> Slaves<'a> {
+        Slaves { master, subdevices: List { all: slaves, context: known, make: SubDevice::new } }
+    }
+}
+
 impl<'a> SubDevice<'a> {
-    /// A SubDevice with what else is known of it.
-    pub fn new(slave: &'a Slave, details: Option<Details<'a>>) -> SubDevice<'a> {
+    fn new(place: usize, slave: &'a Slave, known: &'a [Known]) -> SubDevice<'a> {
         let Slave { line, alias, relative } = slave;
         let [vendor_id, product_code, revision, serial] = line.identity;
         SubDevice {
@@ -73,7 +79,7 @@ impl<'a> SubDevice<'a> {
             product_code,
             revision,
             serial,
-            details,
+            details: known.get(place).map(Details::new),
         }
     }
 }
@@ -85,7 +91,7 @@ pub struct Crc<'a> {
     /// Number of the master
     pub master: u32,
     /// The SubDevices, in the order of their positions
-    pub subdevices: Vec<Counted<'a>>,
+    pub subdevices: List<'a, Slave, &'a [PortsLine], Counted<'a>>,
 }
 
 /// Error counters of a SubDevice.
@@ -97,7 +103,7 @@ pub struct Counted<'a> {
     /// Name of its SII; empty where it has none
     pub name: &'a str,
     /// Its four ports
-    pub ports: Vec<CountedPort>,
+    pub ports: [CountedPort; 4],
 }
 
 /// Error counters of a port. They end at 255.
@@ -121,15 +127,21 @@ pub struct CountedPort {
 }
 
 impl<'a> Crc<'a> {
-    /// SubDevices with their ports.
-    pub fn new(master: u32, slaves: &'a [Slave], of: impl Fn(u16) -> PortsLine) -> Crc<'a> {
-        let counted = |slave: &'a Slave| {
-            let position = slave.line.position;
-            let ports = of(position).ports.iter().enumerate().map(|(port, line)| counted_port(port, line)).collect();
-            Counted { position, name: &slave.line.name, ports }
-        };
-        Crc { master, subdevices: slaves.iter().map(counted).collect() }
+    /// SubDevices and their ports.
+    pub fn new(master: u32, slaves: &'a [Slave], ports: &'a [PortsLine]) -> Crc<'a> {
+        Crc { master, subdevices: List { all: slaves, context: ports, make: counted } }
     }
+}
+
+fn counted<'a>(_: usize, slave: &'a Slave, ports: &'a [PortsLine]) -> Counted<'a> {
+    let position = slave.line.position;
+    let ports = of_slave(ports, position).ports;
+    Counted { position, name: &slave.line.name, ports: [0, 1, 2, 3].map(|port| counted_port(port, &ports[port])) }
+}
+
+/// The ports of the SubDevice at a position; without links where they are not known.
+pub fn of_slave(ports: &[PortsLine], position: u16) -> PortsLine {
+    ports.iter().find(|line| line.position == position).cloned().unwrap_or_default()
 }
 
 fn counted_port(port: usize, line: &PortLine) -> CountedPort {

@@ -4,6 +4,8 @@
 use ringcat_control::tool::EthernetLine;
 use serde::Serialize;
 
+use super::values::List;
+
 /// Versions.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
@@ -31,7 +33,7 @@ pub struct Ethernet<'a> {
     /// Number of the master
     pub master: u32,
     /// Its network interfaces of Ethernet over EtherCAT
-    pub interfaces: Vec<Interface<'a>>,
+    pub interfaces: List<'a, EthernetLine, (), Interface<'a>>,
 }
 
 /// A network interface.
@@ -58,9 +60,15 @@ pub struct Interface<'a> {
     pub queue_frames: u32,
 }
 
+impl<'a> Ethernet<'a> {
+    /// The interfaces of a master.
+    pub fn new(master: u32, all: &'a [EthernetLine]) -> Ethernet<'a> {
+        Ethernet { master, interfaces: List { all, context: (), make: Interface::new } }
+    }
+}
+
 impl<'a> Interface<'a> {
-    /// An interface.
-    pub fn new(line: &'a EthernetLine) -> Interface<'a> {
+    fn new(_: usize, line: &'a EthernetLine, _: ()) -> Interface<'a> {
         let ([received_bytes, sent_bytes], [received_bytes_per_s, sent_bytes_per_s]) = (line.bytes, line.rates);
         let [queued_frames, queue_frames] = line.queue;
         Interface {

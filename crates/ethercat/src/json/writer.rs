@@ -6,6 +6,8 @@ use std::fmt::{self, Display, Write};
 
 use serde::ser::{Error, Impossible, Serialize, SerializeSeq, SerializeStruct, SerializeTuple, Serializer};
 
+use crate::hex;
+
 /// A value of a kind that no type here has.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Unsupported;
@@ -151,6 +153,14 @@ impl Serializer for &mut Writer {
         Ok(())
     }
 
+    /// As hexadecimal digits.
+    fn serialize_bytes(self, value: &[u8]) -> Done {
+        self.text.push('"');
+        hex::put_digits(&mut self.text, value);
+        self.text.push('"');
+        Ok(())
+    }
+
     fn serialize_none(self) -> Done {
         self.text.push_str("null");
         Ok(())
@@ -193,7 +203,6 @@ impl Serializer for &mut Writer {
 
     unsupported! {
         serialize_char(char) -> ();
-        serialize_bytes(&[u8]) -> ();
         serialize_unit_struct(&'static str) -> ();
         serialize_map(Option<usize>) -> Self::SerializeMap;
         serialize_tuple_struct(&'static str, usize) -> Self::SerializeTupleStruct;
