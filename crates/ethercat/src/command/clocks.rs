@@ -30,7 +30,8 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let masters = session.masters()?;
     for master in &masters {
         let number = master.master;
-        let state = session.state(number)?;
+        let state = session.state(number);
+        let Some(state) = session.if_driven(state)? else { continue };
         if session.arguments.json {
             json::print(session, &Clocks::new(number, &state.clocks))?;
             continue;
