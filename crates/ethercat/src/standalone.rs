@@ -9,7 +9,7 @@ use std::io::{ErrorKind, Read};
 use std::os::unix::fs::DirBuilderExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStderr, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use ringcat_control::Client;
@@ -48,7 +48,7 @@ const MOST_WORDS: usize = 4096;
 pub struct Standalone {
     daemon: Child,
     /// What it says before its end.
-    said: Receiver<String>,
+    said: Option<JoinHandle<String>>,
 }
 
 /// The links that the options name, as the option of the daemon; `None` without such an option.
@@ -129,9 +129,14 @@ impl Standalone {
     }
 
     /// What the daemon has said before its end.
-    fn said(&self) -> String {
+    fn said(&mut self) -> String {
+        let begin = Instant::now();
         // A process that it has started may still have its standard error.
-        let text = self.said.recv_timeout(LAST_WORDS).unwrap_or_default();
+        while self.said.as_ref().is_some_and(|said| !said.is_finished()) && begin.elapsed() < LAST_WORDS {
+            std::thread::sleep(LOOK);
+        }
+        let said = self.said.take().filter(JoinHandle::is_finished);
+        let text = said.and_then(|said| said.join().ok()).unwrap_or_default();
         match text.trim_end() {
             "" => "ringcatd has ended".to_owned(),
             text => text.to_owned(),
@@ -148,21 +153,18 @@ impl Drop for Standalone {
 }
 
 /// Reads what the daemon says, to its end. The beginning is kept: it tells why the daemon does not start.
-fn listen_to(stderr: Option<ChildStderr>) -> Receiver<String> {
-    let (sender, said) = channel();
+fn listen_to(stderr: Option<ChildStderr>) -> Option<JoinHandle<String>> {
+    let mut stderr = stderr?;
     let read = move || {
         let (mut kept, mut part) = (Vec::new(), [0; 1024]);
-        let Some(mut stderr) = stderr else { return };
         while let Ok(count @ 1..) = stderr.read(&mut part) {
             let room = MOST_WORDS - kept.len();
             kept.extend(&part[..count.min(room)]);
         }
-        // A command that has ended asks no more.
-        let _ = sender.send(String::from_utf8_lossy(&kept).into_owned());
+        String::from_utf8_lossy(&kept).into_owned()
     };
     // Without the thread nothing is known of it.
-    let _ = std::thread::Builder::new().name("ringcatd".into()).spawn(read);
-    said
+    std::thread::Builder::new().name("ringcatd".into()).spawn(read).ok()
 }
 
 fn late(what: &str) -> Failure {

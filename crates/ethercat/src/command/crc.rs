@@ -6,7 +6,7 @@ use ringcat_control::tool::{MOST_SUBDEVICES, Piece, PortLine, PortsLine, ToolAns
 use crate::append::append;
 use crate::failure::{Failure, unexpected};
 use crate::json;
-use crate::json::slaves::{Crc, of_slave};
+use crate::json::slaves::Crc;
 use crate::selection::Slave;
 use crate::session::Session;
 use crate::shape::{Command, Output};
@@ -75,6 +75,11 @@ pub(super) fn ports(session: &mut Session<'_>, master: u32) -> Result<Vec<PortsL
             return Ok(lines);
         }
     }
+}
+
+/// The ports of the SubDevice at a position; without links where they are not known.
+pub(super) fn of_slave(ports: &[PortsLine], position: u16) -> PortsLine {
+    ports.iter().find(|line| line.position == position).cloned().unwrap_or_default()
 }
 
 fn table(slaves: &[Slave], ports: &[PortsLine]) -> String {

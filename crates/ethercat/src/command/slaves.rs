@@ -5,13 +5,13 @@ use ringcat_control::message::Query;
 use ringcat_control::refusal::Refusal;
 use ringcat_control::tool::{Description, PortsLine, ToolAnswer, ToolQuery};
 
-use super::crc::ports;
+use super::crc::{of_slave, ports};
 use super::slave_details::details;
 use crate::append::append;
 use crate::failure::{Failure, unexpected};
 use crate::json;
 use crate::json::details::Known;
-use crate::json::slaves::{Slaves, of_slave};
+use crate::json::slaves::Slaves;
 use crate::selection::Slave;
 use crate::session::Session;
 use crate::shape::{Command, Output};

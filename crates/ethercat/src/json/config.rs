@@ -3,7 +3,7 @@
 use std::net::Ipv4Addr;
 
 use ringcat_control::tool::{DeclaredLine, DeclaredSyncManager, IdnLine, IpParameters, SdoLine, SyncLine};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::pdos::{PdoList, pdos};
 use super::values::{Direction, Hex, List, state};
@@ -49,7 +49,7 @@ pub struct Declared<'a> {
     /// Pause in PREOP before SAFEOP, in milliseconds
     pub wait_before_safeop_ms: u64,
     /// IP parameters; null without
-    pub ip: Option<Ip>,
+    pub ip: Option<Ip<'a>>,
     /// SYNC signals; null without
     pub sync: Option<Sync>,
 }
@@ -111,19 +111,25 @@ pub struct Idn<'a> {
 /// IP parameters.
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct Ip {
+pub struct Ip<'a> {
     /// MAC address; null where it is not set
-    pub mac_address: Option<String>,
+    #[cfg_attr(test, schemars(with = "Option<String>"))]
+    pub mac_address: Option<Mac<'a>>,
     /// IPv4 address; null where it is not set
-    pub ip_address: Option<String>,
+    #[cfg_attr(test, schemars(with = "Option<String>"))]
+    pub ip_address: Option<Address>,
     /// Subnet mask; null where it is not set
-    pub subnet_mask: Option<String>,
+    #[cfg_attr(test, schemars(with = "Option<String>"))]
+    pub subnet_mask: Option<Address>,
     /// IPv4 address of the gateway; null where it is not set
-    pub default_gateway: Option<String>,
+    #[cfg_attr(test, schemars(with = "Option<String>"))]
+    pub default_gateway: Option<Address>,
     /// IPv4 address of the DNS server; null where it is not set
-    pub dns_address: Option<String>,
+    #[cfg_attr(test, schemars(with = "Option<String>"))]
+    pub dns_address: Option<Address>,
     /// Name, with U+FFFD for what is not UTF-8; null where it is not set
-    pub hostname: Option<String>,
+    #[cfg_attr(test, schemars(with = "Option<String>"))]
+    pub hostname: Option<Name<'a>>,
 }
 
 /// SYNC signals.
@@ -194,15 +200,39 @@ fn sync_manager(_: usize, own: &DeclaredSyncManager, _: ()) -> SyncManager<'_> {
     }
 }
 
-fn ip(ip: &IpParameters) -> Ip {
-    let text = |address: Option<Ipv4Addr>| address.map(|it| it.to_string());
+fn ip(ip: &IpParameters) -> Ip<'_> {
     Ip {
-        mac_address: ip.mac.map(|mac| hex::mac(&mac)),
-        ip_address: text(ip.address),
-        subnet_mask: text(ip.mask),
-        default_gateway: text(ip.gateway),
-        dns_address: text(ip.dns),
-        hostname: ip.name.as_ref().map(|name| String::from_utf8_lossy(name).into_owned()),
+        mac_address: ip.mac.as_ref().map(Mac),
+        ip_address: ip.address.map(Address),
+        subnet_mask: ip.mask.map(Address),
+        default_gateway: ip.gateway.map(Address),
+        dns_address: ip.dns.map(Address),
+        hostname: ip.name.as_deref().map(Name),
+    }
+}
+
+/// As `02:00:00:00:00:01`.
+pub struct Mac<'a>(&'a [u8; 6]);
+/// As `192.168.0.1`.
+pub struct Address(Ipv4Addr);
+/// Text that may be no UTF-8.
+pub struct Name<'a>(&'a [u8]);
+
+impl Serialize for Mac<'_> {
+    fn serialize<Z: Serializer>(&self, serializer: Z) -> Result<Z::Ok, Z::Error> {
+        serializer.serialize_str(&hex::mac(self.0))
+    }
+}
+
+impl Serialize for Address {
+    fn serialize<Z: Serializer>(&self, serializer: Z) -> Result<Z::Ok, Z::Error> {
+        serializer.serialize_str(&self.0.to_string())
+    }
+}
+
+impl Serialize for Name<'_> {
+    fn serialize<Z: Serializer>(&self, serializer: Z) -> Result<Z::Ok, Z::Error> {
+        serializer.serialize_str(&String::from_utf8_lossy(self.0))
     }
 }
 

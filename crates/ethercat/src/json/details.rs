@@ -3,7 +3,7 @@
 use ringcat_control::tool::{ClockFeatures, Description, PortLine, PortsLine};
 use serde::Serialize;
 
-use super::values::Bits;
+use super::values::{Bits, List};
 
 /// Kinds of ports.
 pub const PORT_KINDS: [&str; 4] = ["N/A", "N/C", "EBUS", "MII"];
@@ -74,7 +74,7 @@ pub struct Details<'a> {
     /// Propagation delay from the reference clock, in nanoseconds, 0 while it is not known; null where none is measured
     pub delay_ns: Option<i64>,
     /// Its four ports
-    pub ports: [Port; 4],
+    pub ports: List<'a, PortLine, bool, Port>,
     /// Mailbox protocols: `AoE`, `EoE`, `CoE`, `FoE`, `SoE`, `VoE`
     pub protocols: Bits,
     /// Mailboxes in BOOT; null where its SII has none
@@ -159,7 +159,7 @@ impl<'a> Details<'a> {
             fmmu_bit_operation: features.fmmu_bytes,
             clock: Clock::of(features, *has_clock),
             delay_ns: features.dc.then_some(ports.delay_ns),
-            ports: [0, 1, 2, 3].map(|number| port(number, &ports.ports[number], features.dc)),
+            ports: List { all: &ports.ports, context: features.dc, make: port },
             protocols: protocols(details),
             bootstrap_mailboxes: details.bootstrap.map(Mailboxes::of),
             mailboxes: details.mailbox.map(Mailboxes::of),

@@ -73,14 +73,17 @@ impl<'a> Ring<'a> {
     /// The ring of a master with this number of links, and SubDevices on each.
     pub fn new(master: u32, state: &'a Snapshot, counts: [u16; 2], links: usize) -> Ring<'a> {
         let ring = &state.ring;
-        let is_ring = links >= Link::BOTH.len();
-        let seen = Link::BOTH.into_iter().zip(&ring.links).zip(counts).take(links);
-        let answering = seen.map(|((link, seen), subdevices)| RingLink { link, subdevices, carrier: seen.carrier });
+        let is_ring = links >= ring.links.len();
+        let mut answering = Vec::new();
+        for (place, seen) in ring.links.iter().enumerate().take(links) {
+            let link = RingLink { link: Link::of(place > 0), subdevices: counts[place], carrier: seen.carrier };
+            answering.push(link);
+        }
         Ring {
             master,
             closed: ring.closed.filter(|_| is_ring),
             redundant: ring.redundant.filter(|_| is_ring),
-            links: answering.collect(),
+            links: answering,
             line_break: ring.break_at.as_ref().map(|cable| Cable { near: end(cable.near), far: end(cable.far) }),
             cables: List { all: &state.cables, context: (), make: errors },
         }

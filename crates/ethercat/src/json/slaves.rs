@@ -102,8 +102,8 @@ pub struct Counted<'a> {
     pub position: u16,
     /// Name of its SII; empty where it has none
     pub name: &'a str,
-    /// Its four ports
-    pub ports: [CountedPort; 4],
+    /// Its four ports; empty where nothing is known of them
+    pub ports: List<'a, PortLine, (), CountedPort>,
 }
 
 /// Error counters of a port. They end at 255.
@@ -135,16 +135,11 @@ impl<'a> Crc<'a> {
 
 fn counted<'a>(_: usize, slave: &'a Slave, ports: &'a [PortsLine]) -> Counted<'a> {
     let position = slave.line.position;
-    let ports = of_slave(ports, position).ports;
-    Counted { position, name: &slave.line.name, ports: [0, 1, 2, 3].map(|port| counted_port(port, &ports[port])) }
+    let all: &[PortLine] = ports.iter().find(|line| line.position == position).map_or(&[], |line| &line.ports);
+    Counted { position, name: &slave.line.name, ports: List { all, context: (), make: counted_port } }
 }
 
-/// The ports of the SubDevice at a position; without links where they are not known.
-pub fn of_slave(ports: &[PortsLine], position: u16) -> PortsLine {
-    ports.iter().find(|line| line.position == position).cloned().unwrap_or_default()
-}
-
-fn counted_port(port: usize, line: &PortLine) -> CountedPort {
+fn counted_port(port: usize, line: &PortLine, _: ()) -> CountedPort {
     let [invalid_frames, receive_errors, forwarded_errors, lost_links] = line.errors;
     let (link, neighbour) = (line.link[0], line.neighbour);
     CountedPort { port, link, invalid_frames, receive_errors, forwarded_errors, lost_links, neighbour }

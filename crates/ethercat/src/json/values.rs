@@ -17,9 +17,6 @@ pub enum Link {
 }
 
 impl Link {
-    /// Both, in their order.
-    pub const BOTH: [Link; 2] = [Link::Main, Link::Redundant];
-
     /// One of both.
     pub fn of(is_redundant: bool) -> Link {
         if is_redundant { Link::Redundant } else { Link::Main }
