@@ -1,8 +1,8 @@
 //! Keys of JSON that programs print, for tests: the types of a program are held against the page that documents them,
 //! and its output is held against the page.
 //!
-//! The types are structures with a schema (`schemars`); their comments are the meanings on the page. A key that the page
-//! lacks, or a key of the page that no type has, fails the test. `RINGCAT_WRITE_JSON_KEYS=1` writes the tables.
+//! The types are structures with a schema (`schemars`); their comments are the meanings on the page. A key that the
+//! page lacks, or a key of the page that no type has, fails the test. `RINGCAT_WRITE_JSON_KEYS=1` writes the tables.
 #![forbid(unsafe_code)]
 
 mod page;

@@ -88,7 +88,7 @@ const RULES: &[CrateRule] = &[
             "ringcatd",
             "ringcat-control",
             "ringcat-engine",
-            "ringcat-keys",
+            "json-keys",
             "ringcat-wire",
         ]),
         external: External::Only(&["serde"]),
@@ -102,7 +102,7 @@ const RULES: &[CrateRule] = &[
     CrateRule {
         directory: "cli",
         // Its tests run commands on the bus of a daemon.
-        internal: Internal::Only(&["ringcat", "ringcat-engine", "ringcat-keys", "ringcat-link", "ringcatd"]),
+        internal: Internal::Only(&["json-keys", "ringcat", "ringcat-engine", "ringcat-link", "ringcatd"]),
         external: External::Any,
     },
     CrateRule {

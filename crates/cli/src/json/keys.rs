@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use ringcat_keys::{Table, check_keys, check_page, keys};
+use json_keys::{Table, check_keys, check_page, keys};
 
 use super::{bench, capture, clocks, demo, doctor, eni, esi, line, network, ring, run, scan, sii, sim, standby};
 

@@ -5,12 +5,12 @@ use serde_json::Value;
 const PAGE: &str = include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/json.md"));
 
 /// The tables of the page.
-pub struct Page(ringcat_keys::Page);
+pub struct Page(json_keys::Page);
 
 impl Page {
     /// Reads the page.
     pub fn read() -> Page {
-        let page = ringcat_keys::Page::read(PAGE);
+        let page = json_keys::Page::read(PAGE);
         assert!(page.headings().count() >= 15, "{page:?}");
         Page(page)
     }

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::path::Path;
 
-use ringcat_keys::{Table, check_keys, check_page, keys};
+use json_keys::{Table, check_keys, check_page, keys};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 
 use super::values::{Bits, Hex, List};

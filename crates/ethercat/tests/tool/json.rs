@@ -6,10 +6,10 @@ use std::sync::mpsc::channel;
 
 use ethercat::commands::ALL;
 use ethercat::shape::Output;
+use json_keys::Page;
 use ringcat::automatic;
 use ringcat::sim::cable::CableId;
 use ringcat::sim::fault::Fault;
-use ringcat_keys::Page;
 use serde_json::{Value, json};
 
 use crate::bench::{Bench, Driver, LONG, PROGRAM, directory};
