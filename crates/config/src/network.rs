@@ -3,6 +3,7 @@
 //! described in `docs/network-file.md`.
 
 mod check;
+mod commands;
 mod declare;
 mod error;
 mod esi_names;

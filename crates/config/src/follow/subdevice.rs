@@ -2,24 +2,19 @@
 
 use std::time::Duration;
 
-use ringcat_engine::config::{
-    DeclaredSyncManager, RegisterAccess, RegisterCommand, StartupAction, StartupCommand, StateTimeout, SubDeviceConfig,
-};
+use ringcat_engine::config::{DeclaredSyncManager, StartupCommand, StateTimeout, SubDeviceConfig};
 use ringcat_wire::al::AlState;
-use ringcat_wire::command::{Addressing, Command};
+use ringcat_wire::command::Addressing;
 use ringcat_wire::register::{SyncManager, map};
 
 use super::areas::{self, Piece};
 use super::bus::Bus;
 use super::messages::{command_name, contradiction, named};
 use super::notices::Notices;
-use super::registers::{Registers, is_complete};
-use super::transitions::{at_transitions, comment};
+use super::register_commands::{Class, NotSent, class, is_write, planned, register_command};
+use super::registers::{Registers, UP, is_complete};
 use super::{assignment, clocks, identity, mail, sync_managers};
 use crate::eni::{EcatCommand, Eni, EniError, Place, Target, Transition};
-
-/// The transitions to OP, in the order of sending.
-pub(super) const UP: [Transition; 3] = [Transition::Ip, Transition::Ps, Transition::So];
 
 /// The declaration of a SubDevice and the mapping of its process data.
 pub(super) fn follow(
@@ -34,9 +29,10 @@ pub(super) fn follow(
     let complete = is_complete(commands);
     let mut config = SubDeviceConfig::at(bus.addresses[index]);
     config.expected = identity::expected(eni, index, complete)?;
-    config.watchdog_divider = registers.word(map::WATCHDOG_DIVIDER);
-    config.pdi_watchdog_intervals = registers.word(map::WATCHDOG_TIME_PDI);
-    config.watchdog_intervals = registers.word(map::WATCHDOG_TIME_PROCESS_DATA);
+    let word = |register| registers.word(register).or_else(|| bus.commands.registers.word(register));
+    config.watchdog_divider = word(map::WATCHDOG_DIVIDER);
+    config.pdi_watchdog_intervals = word(map::WATCHDOG_TIME_PDI);
+    config.watchdog_intervals = word(map::WATCHDOG_TIME_PROCESS_DATA);
     config.sii_to_pdi = identity::keeps_eeprom(commands);
     config.declared = sync_managers::declared(eni, index, &registers, complete, notices)?;
     if config.declared.is_none() {
@@ -71,7 +67,8 @@ pub(super) fn follow(
     late_sync_managers(index, commands, &registers, config.declared.as_deref_mut().unwrap_or_default(), notices);
     mail::startup(eni, index, bus, &mut startup, notices)?;
     startup.sort_by_key(|(place, _)| *place);
-    config.startup = startup.into_iter().map(|(_, command)| command).collect();
+    let own = startup.into_iter().map(|(_, command)| command);
+    config.startup = bus.commands.around(index, own);
     let pieces = areas::pieces(eni, index, config.declared.as_deref().unwrap_or_default(), &registers, notices)?;
     Ok((config, pieces))
 }
@@ -112,36 +109,6 @@ fn is_own(eni: &Eni, index: usize, command: &EcatCommand, bus: &Bus, notices: &m
     }
 }
 
-/// How a command is handled.
-enum Class {
-    /// RingCAT performs it itself, or it has become part of the declaration.
-    Handled,
-    /// A state change or the check of its result.
-    State,
-    /// Sent unchanged.
-    Raw,
-    /// Not sent.
-    Refused(&'static str),
-}
-
-/// The class by the addressed register (protocol 3).
-fn class(command: &EcatCommand) -> Class {
-    let Target::Register { ado, .. } = command.datagram.target else { return Class::Handled };
-    let zero = command.datagram.data.iter().all(|byte| *byte == 0);
-    match ado.0 {
-        0x0010..=0x0011 => Class::Handled,
-        0x0100..=0x0117 => Class::Refused("RingCAT controls ports and forwarding: not sent"),
-        0x0120..=0x0137 => Class::State,
-        0x0300..=0x0313 => Class::Handled,
-        0x0400 | 0x0410 | 0x0420 => Class::Handled,
-        0x0500..=0x050F => Class::Handled,
-        0x0600..=0x06FF | 0x0800..=0x087F => Class::Handled,
-        0x0900..=0x0937 | 0x0980..=0x09A7 => Class::Handled,
-        0x09A8..=0x09A9 if zero => Class::Handled,
-        _ => Class::Raw,
-    }
-}
-
 /// Checks that the written station address equals `PhysAddr`.
 fn check_addresses(eni: &Eni, index: usize, command: &EcatCommand) -> Result<(), EniError> {
     let Target::Register { ado, .. } = command.datagram.target else { return Ok(()) };
@@ -156,10 +123,6 @@ fn check_addresses(eni: &Eni, index: usize, command: &EcatCommand) -> Result<(),
     let what = "the station address that is set";
     let hint = "PhysAddr and the command to register 0x0010 must agree: export the file again";
     Err(contradiction(eni, index, command.place, what, station.to_string(), written.to_string(), hint))
-}
-
-fn is_write(command: Command) -> bool {
-    command.writes() && !command.reads()
 }
 
 /// Source and target state of a transition.
@@ -229,40 +192,39 @@ fn raw(
     startup: &mut Vec<(Place, StartupCommand)>,
     notices: &mut Notices,
 ) -> Result<(), EniError> {
-    let Target::Register { ado, .. } = command.datagram.target else { return Ok(()) };
     let subject = named("InitCmd", &command.comment);
-    let mut note = |reason: &str| {
-        notices.add(Some(command.place), Some(index), subject.clone(), reason);
-        Ok(())
-    };
-    let access = match (command.datagram.command, &command.validate) {
-        (Command::Aprw | Command::Fprw | Command::Armw | Command::Frmw, _) => {
-            return note("a command that reads and writes at once is not sent");
+    match register_command(command) {
+        Ok(register) => {
+            startup.extend(planned(command, register, Some(index), &subject, notices));
+            note_order(eni, index, command, &subject, notices);
+            Ok(())
         }
-        (_, Some(validate)) if validate.data.is_empty() => return note("Validate has no data: not sent"),
-        (_, Some(validate)) => RegisterAccess::Check {
-            data: validate.data.clone(),
-            mask: validate.mask.clone(),
-            limit: Duration::from_millis(validate.timeout_ms.into()),
-        },
-        (command, None) if command.reads() => return note("a read whose answer is not compared is not sent"),
-        (_, None) if command.datagram.data.is_empty() => return note("a write without data is not sent"),
-        (_, None) => RegisterAccess::Write(command.datagram.data.clone()),
-    };
-    let end = usize::from(ado.0) + command.datagram.data.len();
-    if end > 0x1_0000 {
-        let what = subject.clone();
-        let got = format!("{} bytes at {ado}", command.datagram.data.len());
-        return Err(contradiction(eni, index, command.place, what, "an end within 64 KiB", got, ""));
+        Err(NotSent::Because(reason)) => {
+            notices.add(Some(command.place), Some(index), subject, reason);
+            Ok(())
+        }
+        Err(NotSent::BeyondMemory(got)) => {
+            Err(contradiction(eni, index, command.place, subject, "an end within 64 KiB", got, ""))
+        }
     }
-    let register = RegisterCommand::new(ado, access)
-        .with_retries(command.retries)
-        .with_required(command.datagram.count.is_some_and(|count| count > 0));
-    startup.extend(at_transitions(command.place, &command.transitions, index, &subject, notices, |transition| {
-        StartupCommand::new(transition, StartupAction::Register(register.clone()))
-            .with_comment(comment(&command.comment))
-    }));
-    Ok(())
+}
+
+/// A command to a register on a way to INIT is sent in INIT, also if the file has it before the request of INIT.
+fn note_order(eni: &Eni, index: usize, command: &EcatCommand, subject: &str, notices: &mut Notices) {
+    let to_init = [Transition::Pi, Transition::Si, Transition::Oi, Transition::Bi];
+    let requests = |transition: &Transition| {
+        let later = eni.subdevices[index].init_commands.iter().filter(|later| later.place > command.place);
+        later.into_iter().any(|later| {
+            let is_request = matches!(later.datagram.target, Target::Register { ado, .. } if ado == map::AL_CONTROL);
+            is_request && is_write(later.datagram.command) && later.transitions.contains(transition)
+        })
+    };
+    let early = command.transitions.iter().filter(|transition| to_init.contains(transition) && requests(transition));
+    let names: Vec<&str> = early.map(|transition| transition.name()).collect();
+    if !names.is_empty() {
+        let reason = format!("at {}: sent in INIT, in the file before the request of INIT", names.join(", "));
+        notices.add(Some(command.place), Some(index), subject, reason);
+    }
 }
 
 /// SyncManagers of process data that the file activates at SO are active in OP only: outputs that take effect in SAFEOP
