@@ -33,5 +33,6 @@ pub use message::{
     Answer, Content, EventLine, HandedBus, HandedLink, HandedLinks, MasterState, Message, Numbered, Owner, Query, Right,
 };
 pub use refusal::{Refusal, ServiceFault};
+pub use ringcat_link::process::wait_readable;
 pub use socket::DEFAULT_SOCKET;
 pub use wire::{Limits, VERSION, WireError};

@@ -40,6 +40,14 @@ impl Failure {
         }
     }
 
+    /// The refusal if nothing drives the master: it waits for its interface, or leaves the bus to another MainDevice.
+    pub const fn not_driven(&self) -> Option<&Refusal> {
+        match self {
+            Failure::Asked(ClientError::Refused(refusal @ Refusal::Fault { .. })) => Some(refusal),
+            _ => None,
+        }
+    }
+
     /// How a service of a SubDevice has failed.
     pub fn fault(&self) -> Option<ServiceFault> {
         match self {

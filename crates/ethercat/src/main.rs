@@ -3,12 +3,17 @@
 use std::io::{self, BufWriter, Write};
 use std::process::ExitCode;
 
+use ethercat::failure::Failure;
+
 fn main() -> ExitCode {
     let arguments: Vec<_> = std::env::args_os().skip(1).collect();
     let mut output = BufWriter::new(io::stdout().lock());
     let mut errors = io::stderr().lock();
     let is_good = ethercat::run(&arguments, &ethercat::session::socket(), &mut output, &mut errors);
-    // A reader that has closed its end gets no more.
-    let is_written = output.flush().is_ok();
-    if is_good && is_written { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    let written = output.flush().map_err(Failure::from);
+    if let (true, Err(failure)) = (is_good, &written) {
+        // Where the standard error is closed nothing can be said.
+        let _ = errors.write_all(failure.text().as_bytes());
+    }
+    if is_good && written.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }

@@ -4,7 +4,6 @@ use std::fmt::Arguments as Formatted;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use ringcat_control::client::ClientError;
 use ringcat_control::message::{Answer, MasterState, Query, Snapshot};
 use ringcat_control::socket::to_connect_to;
 use ringcat_control::tool::{MOST_SUBDEVICES, Piece, SubDeviceLine, ToolAnswer, ToolQuery};
@@ -111,6 +110,11 @@ impl<'a> Session<'a> {
         self.client.as_mut().ok_or_else(unexpected)
     }
 
+    /// Whether the daemon ends with this command.
+    pub const fn is_standalone(&self) -> bool {
+        self.links.is_some()
+    }
+
     /// Asks about a master; `bytes` is data to write. Returns data that was read, too.
     ///
     /// # Errors
@@ -201,12 +205,23 @@ impl<'a> Session<'a> {
     /// # Errors
     /// As [`Session::slaves`].
     pub fn listed_slaves(&mut self, master: u32) -> Result<Vec<Slave>, Failure> {
-        match self.slaves(master) {
-            Err(Failure::Asked(ClientError::Refused(refusal @ Refusal::Fault { .. }))) => {
-                self.say(&refusal.to_string());
-                Ok(Vec::new())
+        let slaves = self.slaves(master);
+        Ok(self.if_driven(slaves)?.unwrap_or_default())
+    }
+
+    /// What a list of several masters shows of one. A master that nothing drives has nothing to show; the standard
+    /// error says why.
+    ///
+    /// # Errors
+    /// Any other failure.
+    pub fn if_driven<T>(&mut self, shown: Result<T, Failure>) -> Result<Option<T>, Failure> {
+        let refusal = shown.as_ref().err().and_then(Failure::not_driven).map(Refusal::to_string);
+        match refusal {
+            Some(text) => {
+                self.say(&text);
+                Ok(None)
             }
-            slaves => slaves,
+            None => shown.map(Some),
         }
     }
 

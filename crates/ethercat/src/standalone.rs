@@ -2,13 +2,14 @@
 //!
 //! The daemon `ringcatd` drives it, as a process of this command with a socket of its own. It is killed at the end, and
 //! ends by itself with the command, however that ends. All SubDevices stay as they are then: in PREOP, unless the
-//! command has asked for another state.
+//! command has brought them to another state.
 
 use std::fs;
 use std::io::{ErrorKind, Read};
 use std::os::unix::fs::DirBuilderExt;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStderr, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use ringcat_control::Client;
@@ -34,23 +35,48 @@ const PREOP: u16 = 2;
 /// The master that the daemon drives.
 const MASTER: u32 = 0;
 
+/// Longest path of a socket that the kernel takes, without what is behind the directory.
+const LONGEST_DIRECTORY: usize = 64;
+/// Longest name of an interface.
+const LONGEST_NAME: usize = 15;
+/// What the daemon has said last is waited for so long, and so much of it is kept.
+const LAST_WORDS: Duration = Duration::from_millis(500);
+const MOST_WORDS: usize = 4096;
+
 /// The daemon of one command.
 #[derive(Debug)]
-pub struct Standalone(Child);
+pub struct Standalone {
+    daemon: Child,
+    /// What it says before its end.
+    said: Receiver<String>,
+}
 
 /// The links that the options name, as the option of the daemon; `None` without such an option.
 ///
 /// # Errors
 /// Options do not fit together.
 pub fn links(arguments: &Arguments) -> Result<Option<String>, String> {
+    for (option, name) in [("--main", &arguments.main), ("--redundant", &arguments.redundant)] {
+        let Some(name) = name.as_deref().filter(|name| !is_interface(name)) else { continue };
+        return Err(format!("option {option}: '{name}' is neither the name nor the address of an interface"));
+    }
     match (&arguments.main, &arguments.redundant, &arguments.sim) {
         (None, None, None) => Ok(None),
+        (.., Some(file)) if file.is_empty() => Err("option --sim needs the name of a file".to_owned()),
         (Some(main), None, None) => Ok(Some(main.clone())),
         (Some(main), Some(redundant), None) => Ok(Some(format!("{main},{redundant}"))),
         (None, None, Some(file)) => Ok(Some(format!("sim:{file}"))),
         (None, Some(_), _) => Err("option --redundant needs --main".to_owned()),
         (Some(_), _, Some(_)) => Err("options --main and --sim exclude each other".to_owned()),
     }
+}
+
+/// Whether it can be the name of an interface, or is an address.
+fn is_interface(name: &str) -> bool {
+    let is_address = name.split(':').count() == 6 && name.len() <= 17;
+    let is_name = (1..=LONGEST_NAME).contains(&name.len());
+    let has_separator = |byte: u8| matches!(byte, b',' | b'/' | b'=' | b':') || byte.is_ascii_whitespace();
+    is_address || is_name && !name.bytes().any(has_separator)
 }
 
 impl Standalone {
@@ -64,7 +90,7 @@ impl Standalone {
         let directory = PrivateDirectory::new()?;
         let socket = directory.0.join("control");
         let spawned = Command::new(program())
-            .args(["--while-input-is-open", "--no-eoe", "--master"])
+            .args(["--while-input-is-open", "--needs-backup", "--no-eoe", "--master"])
             .arg(format!("{MASTER}={links}"))
             .arg("--socket")
             .arg(&socket)
@@ -73,7 +99,9 @@ impl Standalone {
             .stderr(Stdio::piped())
             .spawn();
         let cannot = |error| Failure::failed(format!("'{}' cannot be started: {error}", program().display()));
-        let mut standalone = Standalone(spawned.map_err(cannot)?);
+        let mut daemon = spawned.map_err(cannot)?;
+        let said = listen_to(daemon.stderr.take());
+        let mut standalone = Standalone { daemon, said };
         let mut client = standalone.connect(&socket, begin)?;
         // The connection is enough: nothing is left where the command is ended by a signal.
         drop(directory);
@@ -90,7 +118,7 @@ impl Standalone {
                 Err(ClientError::NoDaemon { .. }) => {}
                 Err(error) => return Err(error.into()),
             }
-            if let Ok(Some(_)) = self.0.try_wait() {
+            if let Ok(Some(_)) = self.daemon.try_wait() {
                 return Err(Failure::failed(self.said()));
             }
             if begin.elapsed() >= START {
@@ -101,12 +129,9 @@ impl Standalone {
     }
 
     /// What the daemon has said before its end.
-    fn said(&mut self) -> String {
-        let mut text = String::new();
-        if let Some(stderr) = &mut self.0.stderr {
-            // What cannot be read was not said.
-            let _ = stderr.read_to_string(&mut text);
-        }
+    fn said(&self) -> String {
+        // A process that it has started may still have its standard error.
+        let text = self.said.recv_timeout(LAST_WORDS).unwrap_or_default();
         match text.trim_end() {
             "" => "ringcatd has ended".to_owned(),
             text => text.to_owned(),
@@ -117,9 +142,27 @@ impl Standalone {
 impl Drop for Standalone {
     fn drop(&mut self) {
         // It may have ended. Nothing is under way: the command has its answers.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+        let _ = self.daemon.kill();
+        let _ = self.daemon.wait();
     }
+}
+
+/// Reads what the daemon says, to its end. The beginning is kept: it tells why the daemon does not start.
+fn listen_to(stderr: Option<ChildStderr>) -> Receiver<String> {
+    let (sender, said) = channel();
+    let read = move || {
+        let (mut kept, mut part) = (Vec::new(), [0; 1024]);
+        let Some(mut stderr) = stderr else { return };
+        while let Ok(count @ 1..) = stderr.read(&mut part) {
+            let room = MOST_WORDS - kept.len();
+            kept.extend(&part[..count.min(room)]);
+        }
+        // A command that has ended asks no more.
+        let _ = sender.send(String::from_utf8_lossy(&kept).into_owned());
+    };
+    // Without the thread nothing is known of it.
+    let _ = std::thread::Builder::new().name("ringcatd".into()).spawn(read);
+    said
 }
 
 fn late(what: &str) -> Failure {
@@ -137,18 +180,21 @@ fn check(client: &mut Client) -> Result<(), Failure> {
     }
 }
 
-/// Waits until the segment is known and its SubDevices are in PREOP, or stay where they are.
+/// Waits until the segment is known and its SubDevices are in PREOP, or stay where they are. Without a link nothing is
+/// known.
 fn settle(client: &mut Client, begin: Instant) -> Result<(), Failure> {
-    let (mut last, mut since) = (None, Instant::now());
+    let (mut last, mut since, mut linked) = (None, Instant::now(), None);
     loop {
         let report = master(client)?;
         let states = states(client)?;
         let are_in_preop = !states.is_empty() && states.iter().all(|state| *state == Some(PREOP));
+        let has_link = report.links.iter().any(|link| link.carrier != Some(false));
+        linked = linked.filter(|_| has_link).or_else(|| has_link.then(Instant::now));
         if last.as_ref() != Some(&states) {
             (last, since) = (Some(states), Instant::now());
         }
-        let has_link = report.links.iter().any(|link| link.carrier != Some(false));
-        if has_link && !report.is_scanning && (are_in_preop || since.elapsed() >= STILL) {
+        let is_still = since.elapsed() >= STILL && linked.is_some_and(|since| since.elapsed() >= STILL);
+        if has_link && !report.is_scanning && (are_in_preop || is_still) {
             return Ok(());
         }
         if !has_link && begin.elapsed() >= LINK {
@@ -190,8 +236,11 @@ struct PrivateDirectory(PathBuf);
 
 impl PrivateDirectory {
     fn new() -> Result<PrivateDirectory, Failure> {
+        // The path of a socket is short.
+        let named = Some(std::env::temp_dir()).filter(|path| path.as_os_str().len() <= LONGEST_DIRECTORY);
+        let place = named.unwrap_or_else(|| PathBuf::from("/tmp"));
         for number in 0..u32::MAX {
-            let path = std::env::temp_dir().join(format!("ethercat-{}-{number}", std::process::id()));
+            let path = place.join(format!("ethercat-{}-{number}", std::process::id()));
             match fs::DirBuilder::new().mode(0o700).create(&path) {
                 Ok(()) => return Ok(PrivateDirectory(path)),
                 // One of an earlier process with this number.
@@ -226,6 +275,11 @@ mod tests {
         assert_eq!(named(Some("eth1"), None, None), Ok(Some("eth1".to_owned())));
         assert_eq!(named(Some("eth1"), Some("eth2"), None), Ok(Some("eth1,eth2".to_owned())));
         assert_eq!(named(None, None, Some("a.toml")), Ok(Some("sim:a.toml".to_owned())));
+        assert_eq!(named(Some("00:00:08:44:ab:66"), None, None), Ok(Some("00:00:08:44:ab:66".to_owned())));
+        for name in ["a,b", "sim:a.toml", "", "sixteen-letters-", "a/b", "0=a", "a b"] {
+            assert!(named(Some(name), None, None).is_err_and(|text| text.contains(&format!("'{name}' is neither"))));
+        }
+        assert!(named(None, None, Some("")).is_err_and(|text| text.contains("--sim")));
         for wrong in [named(None, Some("eth2"), None), named(Some("eth1"), None, Some("a.toml"))] {
             assert!(wrong.is_err_and(|text| text.contains("--main")));
         }

@@ -3,12 +3,12 @@
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use ringcat::daemon::{BusLog, Followed, HandedLink, Lines, adopt_links, serving};
+use ringcat::daemon::{BusLog, Followed, Lines, adopt_links, serving};
 use ringcat::eoe::{Ethernet, EthernetEvent, EthernetOptions};
-use ringcat::foreign::listen;
+use ringcat::foreign::{Listened, ListenedPhase, QuietLinks};
 use ringcat::{
-    Activity, AlState, Error, Handover, Knowledge, Links, LogFilter, LogLevel, Options, Retries, Services, StateScope,
-    SupervisorThread,
+    Activity, AlState, Error, Handover, Knowledge, Links, LogFilter, LogLevel, Options, Retries, Services, Snapshot,
+    StateScope, SupervisorThread,
 };
 
 use crate::ethernet::EthernetInterfaces;
@@ -17,6 +17,8 @@ use crate::opened::Opened;
 
 /// A hand-over waits so long for the end of a scan.
 const SCAN: Duration = Duration::from_secs(20);
+/// A hand-over waits so long for a scan that has not begun.
+const FIRST_SCAN: Duration = Duration::from_millis(200);
 /// A hand-over waits so long for SubDevices that change their states.
 const SETTLE: Duration = Duration::from_secs(3);
 /// States that do not change for this time stay as they are.
@@ -39,8 +41,8 @@ pub struct Lasting<'a> {
     pub debug_level: u32,
     /// Network interfaces of EoE; `None`: there are none.
     pub interfaces: Option<Arc<EthernetInterfaces>>,
-    /// The daemon has driven the master before. Otherwise another MainDevice may: it listens first.
-    pub is_known: bool,
+    /// What was heard on the links: nothing is sent before that.
+    pub listened: Arc<Listened>,
 }
 
 /// The daemon drives a master.
@@ -48,6 +50,7 @@ pub struct Lasting<'a> {
 pub struct Driving {
     supervisor: SupervisorThread,
     log: BusLog,
+    listened: Arc<Listened>,
     /// Moves frames of EoE.
     ethernet: Option<Ethernet>,
 }
@@ -59,11 +62,9 @@ impl Driving {
     /// What is wrong, for the operator.
     pub fn start(opened: &Opened, lasting: &Lasting<'_>, handover: Handover) -> Result<Driving, String> {
         let adopted = adopt_links(opened.links(), opened.duplicates()?);
-        let (mut cyclic, mut acyclic) = adopted.map_err(|error| error.to_string())?;
-        let is_shared = !lasting.is_known && matches!(opened.links().main, HandedLink::Interface { .. });
-        if let Some(heard) = is_shared.then(|| listen(&mut cyclic, &mut acyclic)).flatten() {
-            return Err(heard.to_string());
-        }
+        let (cyclic, acyclic) = adopted.map_err(|error| error.to_string())?;
+        let main_address = acyclic.addresses().main.0;
+        let acyclic = QuietLinks::new(acyclic, cyclic, lasting.listened.clone());
         let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
         let supervisor = match Knowledge::from_bytes(lasting.knowledge) {
             Ok(knowledge) => SupervisorThread::start_resumed(acyclic, &options, (knowledge, handover), || ()),
@@ -86,11 +87,11 @@ impl Driving {
         let log = log.map_err(|error| format!("a thread cannot be started: {error}"))?;
         let ethernet = lasting.interfaces.clone().zip(u16::try_from(number).ok());
         let ethernet = ethernet.map(|(interfaces, index)| {
-            let options = EthernetOptions::new(index, cyclic.addresses().main.0);
+            let options = EthernetOptions::new(index, main_address);
             supervisor.start_lasting_ethernet(options, move |name, mac| interfaces.make(name, mac).map(Some))
         });
         let ethernet = ethernet.transpose().map_err(|error| error.to_string())?;
-        Ok(Driving { supervisor, log, ethernet })
+        Ok(Driving { supervisor, log, listened: lasting.listened.clone(), ethernet })
     }
 
     /// The acyclic half, for questions.
@@ -105,7 +106,10 @@ impl Driving {
 
     /// Ends it without a further frame. What is known of the segment; empty if nothing is.
     pub fn hand_over(self) -> Vec<u8> {
-        let Driving { supervisor, log, ethernet: _ethernet } = self;
+        let Driving { supervisor, log, listened, ethernet: _ethernet } = self;
+        if listened.phase() == ListenedPhase::Free {
+            wait_for_first_scan(&supervisor);
+        }
         wait_for_scan(&supervisor);
         wait_until_settled(&supervisor);
         // What has changed last is printed by the next process that drives the master.
@@ -154,6 +158,21 @@ fn wait_until_settled(supervisor: &SupervisorThread) {
         }
         std::thread::sleep(LOOK);
     }
+}
+
+/// A segment whose cable was just plugged in is about to be scanned.
+fn wait_for_first_scan(supervisor: &SupervisorThread) {
+    let begin = Instant::now();
+    while begin.elapsed() < FIRST_SCAN {
+        match supervisor.with(|engine| engine.snapshot()) {
+            Ok(seen) if seen.activity == Activity::Unscanned && has_carrier(&seen) => std::thread::sleep(LOOK),
+            _ => return,
+        }
+    }
+}
+
+fn has_carrier(seen: &Snapshot) -> bool {
+    seen.ring.links.iter().any(|link| link.carrier == Some(true))
 }
 
 /// Waits for the end of a scan that runs.

@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use ringcat::daemon::{Lines, serving};
+use ringcat::foreign::Listened;
 use ringcat::{AlState, Handover, Knowledge};
 use ringcat_control::message::{Answer, HandedBus, MasterState, Query, ToolAnswer, ToolQuery};
 use ringcat_control::{Content, Message, Refusal};
@@ -25,6 +26,8 @@ use crate::wires::Wires;
 
 /// An owner is told within this time that the daemon has failed.
 const TELL: Duration = Duration::from_millis(100);
+/// It has been listened to the links within this time after they have a carrier.
+const LISTENED: Duration = Duration::from_secs(1);
 /// What it is told, and the operator.
 const FAILED: &str = "a thread of the daemon has failed";
 
@@ -69,8 +72,9 @@ pub struct Master {
     lines: Arc<Mutex<Lines>>,
     /// Level of messages, whatever drives the master.
     debug_level: AtomicU32,
-    /// The daemon has driven it: no other MainDevice does.
-    is_known: AtomicBool,
+    /// What was heard on its links before the first frame, and whether the operator was told of another MainDevice.
+    listened: Arc<Listened>,
+    is_told: AtomicBool,
 }
 
 /// How the time of an owner has ended.
@@ -124,6 +128,7 @@ impl Master {
     /// The same with settings. Links that cannot be opened are tried again by [`Master::supervise`].
     pub fn start(settings: Settings, wires: Wires) -> Master {
         let Settings { number, links, safe_state, lock, interfaces, debug_level } = settings;
+        let is_shared = wires.are_shared();
         let master = Master {
             number,
             links,
@@ -135,7 +140,8 @@ impl Master {
             knowledge: Mutex::default(),
             lines: Arc::default(),
             debug_level: AtomicU32::new(debug_level),
-            is_known: AtomicBool::new(false),
+            listened: Arc::new(if is_shared { Listened::default() } else { Listened::not_shared() }),
+            is_told: AtomicBool::new(false),
         };
         master.drive(Handover::Orderly);
         master.prepare();
@@ -168,9 +174,33 @@ impl Master {
         let (owner, fault) = match &*self.driver.lock() {
             Driver::Owner(owner, _) => (Some(owner.owner().clone()), None),
             Driver::Fault(cause) => (None, Some(cause.clone())),
-            Driver::Daemon(..) | Driver::Changing => (None, None),
+            Driver::Daemon(..) => (None, self.occupied()),
+            Driver::Changing => (None, None),
         };
         MasterState { master: self.number, links: self.links.clone(), owner, fault }
+    }
+
+    /// Why the daemon sends nothing, although it has the links: another MainDevice drives the segment.
+    fn occupied(&self) -> Option<String> {
+        self.listened.heard().map(|heard| heard.to_string())
+    }
+
+    /// Waits until it is known whether another MainDevice drives the segment. Without a carrier there is nothing to
+    /// wait for.
+    pub fn listen(&self) {
+        self.listened.wait(LISTENED);
+        self.tell_of_others();
+    }
+
+    /// Tells the operator once that another MainDevice drives the segment, and that it does no more.
+    fn tell_of_others(&self) {
+        let occupied = self.occupied();
+        if self.is_told.swap(occupied.is_some(), Ordering::AcqRel) != occupied.is_some() {
+            match occupied {
+                Some(cause) => say(format_args!("master {} is not driven: {cause}", self.number)),
+                None => say(format_args!("master {}: the other MainDevice is silent", self.number)),
+            }
+        }
     }
 
     /// Answers a question, from the process that drives it.
@@ -192,7 +222,10 @@ impl Master {
     fn ask_driver(&self, what: Query, bytes: Vec<u8>) -> Answered {
         let master = self.number;
         let supervisor = match &*self.driver.lock() {
-            Driver::Daemon(driving, opened) => Ok((driving.supervisor().clone(), opened.clone())),
+            Driver::Daemon(driving, opened) => match self.occupied() {
+                Some(cause) => return Err(Refusal::Fault { master, cause }),
+                None => Ok((driving.supervisor().clone(), opened.clone())),
+            },
             Driver::Owner(owner, _) => Err(owner.clone()),
             Driver::Changing => return Err(Refusal::Changing { master }),
             Driver::Fault(cause) => return Err(Refusal::Fault { master, cause: cause.clone() }),
@@ -216,6 +249,10 @@ impl Master {
     /// # Errors
     /// Why not. The daemon drives the master then, as far as it did before.
     pub fn hand_over(&self, owner: &Arc<OwnerLink>) -> Result<Tenancy<'_>, Refusal> {
+        self.listen();
+        if let Some(cause) = self.occupied() {
+            return Err(Refusal::Fault { master: self.number, cause });
+        }
         let (driving, opened) = self.driver.take_from_daemon(self.number, CHANGE)?;
         let tenancy = Tenancy { master: self, opened, is_over: false };
         let bytes = driving.hand_over();
@@ -328,6 +365,7 @@ impl Master {
     pub fn supervise(&self) {
         self.prepare();
         self.leave_alone();
+        self.tell_of_others();
         let is_faulty = matches!(&*self.driver.lock(), Driver::Fault(_));
         if is_faulty {
             self.drive(Handover::AfterCrash);
@@ -356,6 +394,7 @@ impl Master {
             match &*driver {
                 Driver::Daemon(..) => {
                     locked(&self.wires).leave();
+                    self.listened.forget();
                     std::mem::replace(&mut *driver, Driver::Fault(cause.clone()))
                 }
                 // An application has got it meanwhile.
@@ -397,10 +436,9 @@ impl Master {
         let knowledge = locked(&self.knowledge);
         let (lines, debug_level) = (self.lines.clone(), self.debug_level.load(Ordering::Acquire));
         let interfaces = self.interfaces.clone();
-        let is_known = self.is_known.load(Ordering::Acquire);
-        let lasting = Lasting { number: self.number, knowledge: &knowledge, lines, debug_level, interfaces, is_known };
+        let listened = self.listened.clone();
+        let lasting = Lasting { number: self.number, knowledge: &knowledge, lines, debug_level, interfaces, listened };
         let driving = Driving::start(&opened, &lasting, handover)?;
-        self.is_known.store(true, Ordering::Release);
         for absent in opened.absent() {
             say(format_args!("master {}: interface {absent} is not there; the ring goes on without it", self.number));
         }

@@ -4,6 +4,7 @@
 //! message how many links its segment has, or what is wrong. Then it gets the far ends of pipes, whenever the daemon
 //! connects the links anew. It ends when the daemon and all processes at the near ends are gone.
 
+use std::ffi::OsString;
 use std::io::{self, ErrorKind, Read, Write};
 use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::net::UnixStream;
@@ -42,7 +43,11 @@ pub fn start(file: &Path) -> Result<(Child, UnixStream, bool), String> {
     let program = std::env::current_exe().map_err(failed)?;
     let mut command = Command::new(program);
     // Ctrl-C ends the daemon; the segment lives on for an application that drives it.
-    command.arg(OPTION).arg(file).stdin(Stdio::from(OwnedFd::from(far))).process_group(0);
+    // In one word, since the name may begin with a minus.
+    let mut option = OsString::from(OPTION);
+    option.push("=");
+    option.push(file);
+    command.arg(option).stdin(Stdio::from(OwnedFd::from(far))).process_group(0);
     let child = command.spawn().map_err(failed)?;
     drop(command);
     let is_ring = greeting(&near)?;
@@ -97,6 +102,9 @@ pub fn run(file: &Path) -> Result<(), String> {
 fn load(file: &Path) -> Result<Network, String> {
     let named = |error: String| format!("{}: {error}", file.display());
     let segment = load_segment(file).map_err(|error| named(error.to_string()))?;
+    if segment.devices.is_empty() {
+        return Err(named("the segment has no [[device]]".to_owned()));
+    }
     Network::from_description(segment).map_err(|error| named(error.to_string()))
 }
 

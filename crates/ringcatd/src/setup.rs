@@ -53,6 +53,9 @@ pub struct Given {
     /// End with the standard input: the daemon of one command
     #[arg(long, hide = true)]
     pub while_input_is_open: bool,
+    /// A ring is not driven while one of its interfaces is absent
+    #[arg(long, hide = true)]
+    pub needs_backup: bool,
 }
 
 /// What the daemon does.
@@ -105,7 +108,7 @@ impl Setup {
             has_eoe: !given.no_eoe && own.eoe.unwrap_or(true),
             up_down,
             debug_level: own.debug_level.unwrap_or(0),
-            needs_backup: own.needs_backup,
+            needs_backup: given.needs_backup || own.needs_backup,
             ends_with_input: given.while_input_is_open,
         })
     }

@@ -98,6 +98,11 @@ impl Wires {
         misfit((*chosen)?)
     }
 
+    /// Whether other programs and machines may have access to the segment.
+    pub const fn are_shared(&self) -> bool {
+        matches!(self, Wires::Interfaces(_))
+    }
+
     /// Leaves the interface that was chosen. The next open chooses again.
     pub fn leave(&mut self) {
         if let Wires::Interfaces(Interfaces { chosen, .. }) = self {

@@ -41,6 +41,9 @@ pub struct Segment {
     pub cables: Vec<CableSpec>,
 }
 
+/// Longest segment file: 65,535 devices take a few megabytes.
+const MOST_BYTES: u64 = 64 * 1024 * 1024;
+
 impl Segment {
     /// Reads a segment file. Paths of SII images are relative to it. Devices of description files (ESI) need
     /// [`Segment::load_with`].
@@ -56,8 +59,7 @@ impl Segment {
     /// # Errors
     /// The errors of [`Segment::load`], and those of the description files.
     pub fn load_with(path: &Path, descriptions: &dyn DescribedDevices) -> Result<Segment, SegmentError> {
-        let bytes =
-            std::fs::read(path).map_err(|error| SegmentError::new(format!("cannot be read: {error}")).in_file(path))?;
+        let bytes = read(path).map_err(|text| SegmentError::new(text).in_file(path))?;
         let text = String::from_utf8(bytes).map_err(|error| {
             let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
             let line = 1 + valid.iter().filter(|byte| **byte == b'\n').count();
@@ -96,6 +98,17 @@ impl Segment {
             devices: plan.into_iter().map(|device| device.description).collect(),
             cables,
         })
+    }
+}
+
+/// The bytes of a segment file. A pipe could keep its reader waiting for ever, and a device never ends.
+fn read(path: &Path) -> Result<Vec<u8>, String> {
+    let failed = |error: std::io::Error| format!("cannot be read: {error}");
+    let kind = std::fs::metadata(path).map_err(failed)?;
+    match () {
+        () if !kind.is_file() && !kind.is_dir() => Err("cannot be read: it is no regular file".to_owned()),
+        () if kind.len() > MOST_BYTES => Err(format!("it is longer than {MOST_BYTES} bytes")),
+        () => std::fs::read(path).map_err(failed),
     }
 }
 

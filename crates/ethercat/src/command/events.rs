@@ -1,8 +1,13 @@
 //! `events`: what has happened on the bus. Not a command of the original tool.
 
+use std::fs::File;
+use std::io;
+use std::os::fd::AsFd;
+use std::os::unix::fs::FileTypeExt;
 use std::time::Duration;
 
-use ringcat_control::message::{Answer, EventLine, Query};
+use ringcat_control::message::{Answer, EventLine, MasterState, Query};
+use ringcat_control::wait_readable;
 
 use crate::failure::{Failure, unexpected};
 use crate::session::Session;
@@ -29,6 +34,8 @@ number of its master. Not a command of IgH.
 /// Events of a master that were shown.
 struct Shown {
     master: u32,
+    /// It was driven when it was asked last. The standard error tells once that it is not.
+    is_driven: bool,
     /// Number of the next one.
     next: u64,
     /// Identifies the numbering, once it is known.
@@ -38,7 +45,8 @@ struct Shown {
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let masters = session.masters()?;
     let is_alone = masters.len() == 1;
-    let mut all: Vec<Shown> = masters.iter().map(|it| Shown { master: it.master, next: 0, epoch: None }).collect();
+    let shown = |it: &MasterState| Shown { master: it.master, is_driven: true, next: 0, epoch: None };
+    let mut all: Vec<Shown> = masters.iter().map(shown).collect();
     loop {
         for shown in &mut all {
             while show(session, shown, is_alone)? {}
@@ -47,14 +55,41 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
             return Ok(());
         }
         session.flush()?;
-        std::thread::sleep(LOOK);
+        if pause() == Reader::Gone {
+            return Err(Failure::Closed);
+        }
     }
+}
+
+/// What reads the output.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Reader {
+    Reads,
+    Gone,
+}
+
+/// Waits until the next question, or until the pipe to which the output goes is closed at its other end.
+fn pause() -> Reader {
+    let output = io::stdout();
+    let owned = output.as_fd().try_clone_to_owned().map(File::from);
+    let is_pipe = owned.and_then(|file| file.metadata()).is_ok_and(|kind| kind.file_type().is_fifo());
+    if !is_pipe {
+        std::thread::sleep(LOOK);
+        return Reader::Reads;
+    }
+    if wait_readable(&[output.as_fd()], LOOK) == 0 { Reader::Reads } else { Reader::Gone }
 }
 
 /// Shows events of a master from the next one on, as many as an answer has. Whether there may be more.
 fn show(session: &mut Session<'_>, shown: &mut Shown, is_alone: bool) -> Result<bool, Failure> {
     let master = shown.master;
-    let (answer, _) = session.ask(master, Query::Events { from: shown.next }, Vec::new())?;
+    let answer = match session.ask(master, Query::Events { from: shown.next }, Vec::new()) {
+        Err(failure) if failure.not_driven().is_some() && !shown.is_driven => return Ok(false),
+        answer => answer,
+    };
+    let answer = session.if_driven(answer)?;
+    shown.is_driven = answer.is_some();
+    let Some((answer, _)) = answer else { return Ok(false) };
     let Answer::Events { epoch, missed, next, events } = answer else { return Err(unexpected()) };
     let is_same = shown.epoch.is_none_or(|before| before == epoch);
     shown.epoch = Some(epoch);

@@ -27,7 +27,8 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let masters = session.masters()?;
     for master in &masters {
         let number = master.master;
-        let state = session.state(number)?;
+        let state = session.state(number);
+        let Some(state) = session.if_driven(state)? else { continue };
         let (Answer::Overview(seen), _) = session.ask(number, Query::Overview, Vec::new())? else {
             return Err(unexpected());
         };

@@ -1,5 +1,7 @@
 //! `states`: requests states.
 
+use ringcat_control::client::ClientError;
+use ringcat_control::message::Query;
 use ringcat_control::tool::ToolQuery;
 
 use crate::failure::Failure;
@@ -13,7 +15,8 @@ pub const COMMAND: Command = Command {
     summary: "Request application-layer states.",
     forms: &["<STATE>"],
     help: "STATE is INIT, PREOP, BOOT, SAFEOP or OP. The command does not wait until
-the slaves have reached it.
+the slaves have reached it; with --main or --sim it does, since nothing
+leads them on after its end.
 ",
     options: SELECTION,
     run,
@@ -29,11 +32,23 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         "OP" => 8,
         _ => return Err(Failure::usage(format!("Invalid state '{text}'!"))),
     };
+    let mut failed = Vec::new();
     for master in session.masters()? {
         for slave in session.listed_slaves(master.master)? {
             let position = slave.line.position;
-            session.done(master.master, ToolQuery::StartState { position, state }, Vec::new())?;
+            if !session.is_standalone() {
+                session.done(master.master, ToolQuery::StartState { position, state }, Vec::new())?;
+                continue;
+            }
+            match session.ask(master.master, Query::RequestState { position, state }, Vec::new()) {
+                Ok(_) => {}
+                // The others may reach it.
+                Err(Failure::Asked(ClientError::Refused(refusal))) => {
+                    failed.push(format!("Slave {position}: {refusal}"))
+                }
+                Err(failure) => return Err(failure),
+            }
         }
     }
-    Ok(())
+    if failed.is_empty() { Ok(()) } else { Err(Failure::failed(failed.join("\n"))) }
 }

@@ -55,6 +55,10 @@ fn a_master_that_waits_for_its_interface_lists_none_and_says_why() {
         };
         assert_eq!(lines(&done.out), lines(&bench.good(&[command, &["-m0"]].concat())), "{command:?}");
     }
+    for (command, shown) in [("ring", "ring "), ("events", "0: ["), ("clocks", "")] {
+        let done = bench.tool(&[command]);
+        assert!(done.code == Some(0) && done.err.contains(why) && done.out.contains(shown), "{command}: {done:?}");
+    }
     assert!(bench.good(&["master"]).contains("(waiting...)"));
     let single = bench.bad(&["upload", "-m1", "-p0", "0x1000", "0"]);
     assert!(single.starts_with(&format!("ringcatd: {why}")), "{single}");

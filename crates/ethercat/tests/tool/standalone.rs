@@ -109,14 +109,120 @@ fn a_command_that_a_signal_ends_leaves_neither_files_nor_a_daemon_behind() {
 
 // covers: daemon
 #[test]
+fn states_without_a_daemon_are_reached_when_the_command_ends() {
+    if !has_daemon() {
+        return;
+    }
+    let directory = directory();
+    let file = directory.join("slow.toml");
+    let text = "[[device]]\ntype = \"digital-input-8\"\n[[device]]\ntype = \"servo\"\nto_safeop_ms = 700\n";
+    std::fs::write(&file, text).expect("it can be written");
+    let run = |words: &[&str]| {
+        let begin = Instant::now();
+        let done = tool(Path::new(NOWHERE), &[words, &["--sim", file.to_str().expect("it is text")]].concat());
+        (done, begin.elapsed())
+    };
+    let (done, took) = run(&["states", "SAFEOP"]);
+    assert!(done.code == Some(0) && done.err.is_empty(), "{done:?}");
+    assert!(took >= Duration::from_millis(700), "{took:?}");
+    let (done, _) = run(&["states", "-p0", "BOOT"]);
+    assert_eq!(done.code, Some(1), "{done:?}");
+    assert!(done.err.contains("position 0") && done.err.contains("no mailboxes for BOOT"), "{done:?}");
+    std::fs::remove_dir_all(directory).expect("it is ours");
+}
+
+// covers: daemon
+#[test]
+fn a_reader_that_closes_its_end_ends_a_command_that_follows_events() {
+    if !has_daemon() {
+        return;
+    }
+    let (directory, file) = segment();
+    let mut command = Command::new(PROGRAM);
+    command.args(["events", "--follow", "--sim", &file]).stdin(Stdio::null()).stdout(Stdio::piped());
+    let mut command = command.spawn().expect("it starts");
+    let mut output = BufReader::new(command.stdout.take().expect("it is piped"));
+    let mut line = String::new();
+    output.read_line(&mut line).expect("it is text");
+    drop(output);
+    let begin = Instant::now();
+    while command.try_wait().expect("it is a child").is_none() {
+        assert!(begin.elapsed() < LONG, "it goes on");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    std::fs::remove_dir_all(directory).expect("it is ours");
+}
+
+// covers: daemon
+#[test]
+fn an_output_that_cannot_be_written_is_named() {
+    if !has_daemon() {
+        return;
+    }
+    let (directory, file) = segment();
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").expect("it is there");
+    let output = Command::new(PROGRAM).args(["slaves", "--sim", &file]).stdout(full).output().expect("it starts");
+    assert_eq!(output.status.code(), Some(1));
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(text.starts_with("Failed to write the output: No space left on device"), "{text}");
+    std::fs::remove_dir_all(directory).expect("it is ours");
+}
+
+// covers: daemon
+#[test]
+fn a_segment_file_may_have_any_name_but_must_be_a_file_with_devices() {
+    if !has_daemon() {
+        return;
+    }
+    let (directory, file) = segment();
+    let run = |file: &str| {
+        let mut command = Command::new(PROGRAM);
+        command.args(["slaves", &format!("--sim={file}")]).current_dir(&directory).stdin(Stdio::null());
+        let output = command.output().expect("it starts");
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    std::fs::copy(&file, directory.join("-x.toml")).expect("it can be written");
+    assert_eq!(run("-x.toml"), (Some(0), String::new()));
+    std::fs::write(directory.join("empty.toml"), "").expect("it can be written");
+    assert!(Command::new("mkfifo").arg(directory.join("pipe")).status().expect("it is there").success());
+    for (file, text) in [
+        ("empty.toml", "empty.toml: the segment has no [[device]]\n"),
+        ("pipe", "pipe: cannot be read: it is no regular file\n"),
+        ("/dev/zero", "/dev/zero: cannot be read: it is no regular file\n"),
+    ] {
+        let (code, said) = run(file);
+        assert!(code == Some(1) && said.ends_with(text), "{file}: {code:?} {said}");
+    }
+    std::fs::remove_dir_all(directory).expect("it is ours");
+}
+
+// covers: daemon
+#[test]
+fn a_long_path_for_temporary_files_is_no_obstacle() {
+    if !has_daemon() {
+        return;
+    }
+    let (directory, file) = segment();
+    let long = directory.join("x".repeat(120));
+    std::fs::create_dir(&long).expect("it can be made");
+    let mut command = Command::new(PROGRAM);
+    let output = command.args(["slaves", "--sim", &file]).env("TMPDIR", &long).output().expect("it starts");
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+    std::fs::remove_dir_all(directory).expect("it is ours");
+}
+
+// covers: daemon
+#[test]
 fn what_does_not_fit_or_cannot_be_driven_is_named() {
     let run = |words: &[&str]| -> Done { tool(Path::new(NOWHERE), &[&["slaves"], words].concat()) };
     for (words, text) in [
         (&["--redundant", "eth2"][..], "option --redundant needs --main"),
         (&["--main", "eth1", "--sim", "a.toml"], "options --main and --sim exclude each other"),
+        (&["--main", "sim:a"], "option --main: 'sim:a' is neither the name nor the address of an interface"),
+        (&["--main", "eth1", "--redundant", "a,b"], "option --redundant: 'a,b' is neither the name nor the address"),
     ] {
         let done = run(words);
-        assert!(done.code == Some(1) && done.err.starts_with(&format!("ethercat: {text}\n")), "{done:?}");
+        assert!(done.code == Some(1) && done.err.starts_with(&format!("ethercat: {text}")), "{done:?}");
     }
     if !has_daemon() {
         return;

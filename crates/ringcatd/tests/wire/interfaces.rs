@@ -1,5 +1,6 @@
 //! Interfaces that are absent, are removed and come back, while the daemon or an application drives the segment.
 
+use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
@@ -8,7 +9,7 @@ use ringcat::daemon::{Answer, Query};
 use ringcat_control::message::{ToolAnswer, ToolQuery};
 use ringcat_control::tool::MasterReport;
 
-use crate::bench::{Bench, LINE, RING};
+use crate::bench::{Bench, LINE, RING, ip};
 
 /// What `ethercat master` shows.
 fn report(bench: &Bench) -> Option<Box<MasterReport>> {
@@ -169,15 +170,10 @@ fn a_segment_that_another_main_device_controls_is_left_alone_until_that_ends() {
     bench.wait_for(AlState::Op);
     let socket = bench.place.join("second");
     bench.start_daemon_at(&socket, &["--master", "0=near0"]);
-    let fault = |bench: &Bench| match bench.client_at(&socket).ask(0, Query::Masters, Vec::new()) {
-        Ok((Answer::Masters(masters), _)) => masters[0].fault.clone(),
-        other => panic!("{other:?}"),
-    };
     let begin = Instant::now();
     while begin.elapsed() < Duration::from_secs(3) {
-        let fault = fault(&bench);
-        let is_right = |text: &String| text.starts_with("another MainDevice controls this segment: its frames, from ");
-        assert!(fault.as_ref().is_some_and(is_right), "{fault:?}");
+        let fault = fault(&bench, &socket);
+        assert!(fault.as_ref().is_some_and(|text| text.starts_with(OTHER)), "{fault:?}");
         assert_eq!(bench.states(), "8 8 8 ");
         std::thread::sleep(Duration::from_millis(5));
     }
@@ -186,8 +182,61 @@ fn a_segment_that_another_main_device_controls_is_left_alone_until_that_ends() {
     owner.wait().expect("it has ended");
     bench.wait_for(AlState::PreOp);
     std::thread::sleep(Duration::from_secs(2));
-    assert!(fault(&bench).is_some(), "{:#?}", bench.lines());
+    assert!(fault(&bench, &socket).is_some(), "{:#?}", bench.lines());
     bench.kill_daemon(first);
-    bench.wait_until("the second one drives it", || fault(&bench).is_none());
+    bench.wait_until("the second one drives it", || fault(&bench, &socket).is_none());
+    bench.wait_for(AlState::PreOp);
+}
+
+/// What a daemon says of a segment that another MainDevice drives.
+const OTHER: &str = "another MainDevice controls this segment: its frames, from ";
+
+/// Why the daemon at this socket does not drive its master.
+fn fault(bench: &Bench, socket: &Path) -> Option<String> {
+    match bench.client_at(socket).ask(0, Query::Masters, Vec::new()) {
+        Ok((Answer::Masters(masters), _)) => masters[0].fault.clone(),
+        other => panic!("{other:?}"),
+    }
+}
+
+// covers: daemon, other-main-device
+#[test]
+fn a_segment_is_listened_to_from_when_its_cable_is_plugged_in() {
+    let Some(mut bench) = Bench::make(LINE, &[0]) else { return };
+    let near = bench.near.clone();
+    let near = |arguments: &str| ip(&format!("-n {near} link {arguments}"));
+    // A hub with the segment, and two interfaces: the cable of the second one is out.
+    near("add hub type bridge");
+    near("set hub addrgenmode none up");
+    near("set near0 master hub");
+    for name in ["a", "b"] {
+        near(&format!("add {name}0 type veth peer name {name}1"));
+        near(&format!("set {name}0 addrgenmode none up"));
+        near(&format!("set {name}1 addrgenmode none master hub"));
+    }
+    near("set a1 up");
+    bench.start_segment("0");
+    let first = bench.start_daemon(&["--master", "0=a0"]);
+    bench.wait_for(AlState::PreOp);
+    let mut owner = bench.application("killed");
+    bench.wait_for(AlState::Op);
+    let socket = bench.place.join("second");
+    bench.start_daemon_at(&socket, &["--master", "0=b0"]);
+    assert_eq!(fault(&bench, &socket), None, "it waits for a link");
+    std::thread::sleep(Duration::from_millis(600));
+    near("set b1 up");
+    let begin = Instant::now();
+    while begin.elapsed() < Duration::from_secs(3) {
+        assert_eq!(bench.states(), "8 8 8 ");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let text = fault(&bench, &socket);
+    assert!(text.as_ref().is_some_and(|text| text.starts_with(OTHER)), "{text:?}");
+    let told = bench.lines().iter().filter(|line| line.contains(OTHER)).count();
+    assert_eq!(told, 1, "it is told once: {:#?}", bench.lines());
+    owner.kill().expect("it runs");
+    owner.wait().expect("it has ended");
+    bench.kill_daemon(first);
+    bench.wait_until("the second one drives it", || fault(&bench, &socket).is_none());
     bench.wait_for(AlState::PreOp);
 }

@@ -1,0 +1,95 @@
+//! What was heard on the links of a segment before the first frame.
+
+use std::hash::{BuildHasher, RandomState};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::{Heard, LISTEN};
+
+/// Two MainDevices that begin at the same time do not listen equally long: the one that has to listen longer hears the
+/// other. Up to this time is added.
+const SPREAD: Duration = Duration::from_millis(100);
+/// Interval of looks of a thread that waits.
+const LOOK: Duration = Duration::from_millis(1);
+
+/// Whether a segment may be driven.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ListenedPhase {
+    /// No link has a carrier: nothing can be heard.
+    NoCarrier,
+    /// It is listened to.
+    Listening,
+    /// Another MainDevice drives it, whose first frame was this.
+    Occupied(Heard),
+    /// Nothing was heard for long enough: it is driven.
+    Free,
+}
+
+/// What was heard on the links of a segment; shared with other threads, and kept while the segment passes from one
+/// process to another.
+#[derive(Debug)]
+pub struct Listened {
+    phase: Mutex<ListenedPhase>,
+    lasts: Duration,
+}
+
+impl Default for Listened {
+    /// Nothing was heard yet.
+    fn default() -> Listened {
+        let random = RandomState::new().hash_one(0_u8);
+        let spread = SPREAD.as_nanos() as u64;
+        Listened::lasting(LISTEN + Duration::from_nanos(random % spread))
+    }
+}
+
+impl Listened {
+    /// Nothing was heard yet, and it is listened for this time.
+    pub fn lasting(lasts: Duration) -> Listened {
+        Listened { phase: Mutex::new(ListenedPhase::NoCarrier), lasts }
+    }
+
+    /// A segment that nothing else can drive.
+    pub fn not_shared() -> Listened {
+        Listened { phase: Mutex::new(ListenedPhase::Free), lasts: Duration::ZERO }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, ListenedPhase> {
+        self.phase.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether the segment may be driven.
+    pub fn phase(&self) -> ListenedPhase {
+        *self.lock()
+    }
+
+    /// The first frame of the MainDevice that drives the segment.
+    pub fn heard(&self) -> Option<Heard> {
+        match self.phase() {
+            ListenedPhase::Occupied(heard) => Some(heard),
+            _ => None,
+        }
+    }
+
+    /// Waits while it is listened to, up to this limit.
+    pub fn wait(&self, limit: Duration) {
+        let begin = Instant::now();
+        while self.phase() == ListenedPhase::Listening && begin.elapsed() < limit {
+            std::thread::sleep(LOOK);
+        }
+    }
+
+    /// The links are others from now on.
+    pub fn forget(&self) {
+        self.set(ListenedPhase::NoCarrier);
+    }
+
+    pub(super) fn set(&self, phase: ListenedPhase) {
+        *self.lock() = phase;
+    }
+
+    /// How long it is listened.
+    pub(super) const fn lasts(&self) -> Duration {
+        self.lasts
+    }
+}
