@@ -6,6 +6,7 @@ mod check;
 mod commands;
 mod declare;
 mod error;
+mod esi_differences;
 mod esi_names;
 mod from_esi;
 mod from_scan;

@@ -142,9 +142,9 @@ fn a_refused_message_of_aoe_and_messages_without_a_header_are_reported() {
     let text = failure(StartupAction::Mail(MailMessage::Aoe(ads(999, &AdsRequest::ReadState))));
     assert!(text.starts_with("start-up command 0 (PREOP to SAFEOP) \"a look\": AoE: not delivered: "), "{text}");
     for message in [MailMessage::Aoe(vec![0; 31]), MailMessage::Voe(vec![0; 5])] {
-        let refused = try_world(&[(Transition::Ps, StartupAction::Mail(message))]).err().expect("it was taken");
+        let refused = try_world(&[(Transition::Ps, StartupAction::Mail(message))]).expect_err("it was taken");
         assert!(refused.contains("no header of its protocol"), "{refused}");
     }
-    let early = try_world(&[(Transition::Ii, StartupAction::IdnRead(read(1)))]).err().expect("it was taken");
+    let early = try_world(&[(Transition::Ii, StartupAction::IdnRead(read(1)))]).expect_err("it was taken");
     assert!(early.contains("INIT has no mailbox"), "{early}");
 }
