@@ -33,7 +33,7 @@ impl Bus {
             plugged_into: plugged_into(eni, &stations)?,
             groups,
             ccs_is_reversed: ccs_is_reversed(eni),
-            commands: WholeBus::of(eni, &stations, notices),
+            commands: WholeBus::of(eni, &stations, notices)?,
         };
         of_mailboxes(eni, notices);
         if eni.main_device.eoe {

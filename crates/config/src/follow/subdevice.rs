@@ -41,6 +41,7 @@ pub(super) fn follow(
     config.declared_bootstrap = sync_managers::bootstrap(eni, index)?;
     config.sync = clocks::of_subdevice(eni, index, &registers, complete, notices);
     let mut startup: Vec<(Place, StartupCommand)> = Vec::new();
+    let requests = requests_of_init(commands);
     let mut eeprom_address = None;
     for command in commands {
         if !is_own(eni, index, command, bus, notices) {
@@ -53,7 +54,7 @@ pub(super) fn follow(
         match class(command) {
             Class::Handled if identity::is_sent(command, eeprom_address) => {
                 for command in eeprom_address.into_iter().chain([command]) {
-                    raw(eni, index, command, &mut startup, notices)?;
+                    raw(eni, index, command, &requests, &mut startup, notices)?;
                 }
             }
             Class::Handled => {}
@@ -61,7 +62,7 @@ pub(super) fn follow(
             Class::Refused(reason) => {
                 notices.add(Some(command.place), Some(index), named("InitCmd", &command.comment), reason)
             }
-            Class::Raw => raw(eni, index, command, &mut startup, notices)?,
+            Class::Raw => raw(eni, index, command, &requests, &mut startup, notices)?,
         }
     }
     late_sync_managers(index, commands, &registers, config.declared.as_deref_mut().unwrap_or_default(), notices);
@@ -189,6 +190,7 @@ fn raw(
     eni: &Eni,
     index: usize,
     command: &EcatCommand,
+    requests: &[(Transition, Option<Place>)],
     startup: &mut Vec<(Place, StartupCommand)>,
     notices: &mut Notices,
 ) -> Result<(), EniError> {
@@ -196,7 +198,7 @@ fn raw(
     match register_command(command) {
         Ok(register) => {
             startup.extend(planned(command, register, Some(index), &subject, notices));
-            note_order(eni, index, command, &subject, notices);
+            note_order(index, command, requests, &subject, notices);
             Ok(())
         }
         Err(NotSent::Because(reason)) => {
@@ -209,18 +211,33 @@ fn raw(
     }
 }
 
+/// Ways to INIT, with the last request of INIT that the file has at each.
+fn requests_of_init(commands: &[EcatCommand]) -> [(Transition, Option<Place>); 4] {
+    let mut last =
+        [Transition::Pi, Transition::Si, Transition::Oi, Transition::Bi].map(|transition| (transition, None));
+    for command in commands {
+        let is_request = matches!(command.datagram.target, Target::Register { ado, .. } if ado == map::AL_CONTROL);
+        if !is_request || !is_write(command.datagram.command) {
+            continue;
+        }
+        let named = last.iter_mut().filter(|(transition, _)| command.transitions.contains(transition));
+        named.for_each(|(_, place)| *place = (*place).max(Some(command.place)));
+    }
+    last
+}
+
 /// A command to a register on a way to INIT is sent in INIT, also if the file has it before the request of INIT.
-fn note_order(eni: &Eni, index: usize, command: &EcatCommand, subject: &str, notices: &mut Notices) {
-    let to_init = [Transition::Pi, Transition::Si, Transition::Oi, Transition::Bi];
-    let requests = |transition: &Transition| {
-        let later = eni.subdevices[index].init_commands.iter().filter(|later| later.place > command.place);
-        later.into_iter().any(|later| {
-            let is_request = matches!(later.datagram.target, Target::Register { ado, .. } if ado == map::AL_CONTROL);
-            is_request && is_write(later.datagram.command) && later.transitions.contains(transition)
-        })
+fn note_order(
+    index: usize,
+    command: &EcatCommand,
+    requests: &[(Transition, Option<Place>)],
+    subject: &str,
+    notices: &mut Notices,
+) {
+    let is_early = |(transition, place): &&(Transition, Option<Place>)| {
+        *place > Some(command.place) && command.transitions.contains(transition)
     };
-    let early = command.transitions.iter().filter(|transition| to_init.contains(transition) && requests(transition));
-    let names: Vec<&str> = early.map(|transition| transition.name()).collect();
+    let names: Vec<&str> = requests.iter().filter(is_early).map(|(transition, _)| transition.name()).collect();
     if !names.is_empty() {
         let reason = format!("at {}: sent in INIT, in the file before the request of INIT", names.join(", "));
         notices.add(Some(command.place), Some(index), subject, reason);

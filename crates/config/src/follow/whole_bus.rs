@@ -11,7 +11,7 @@ use super::messages::{command_name, named};
 use super::notices::Notices;
 use super::register_commands::{Class, NotSent, class, is_write, planned, register_command};
 use super::registers::{Registers, UP};
-use crate::eni::{EcatCommand, Eni, Place, Target};
+use crate::eni::{EcatCommand, Eni, EniError, Place, Problem, Target};
 
 /// Commands to the whole bus, as start-up commands.
 #[derive(Default)]
@@ -27,16 +27,34 @@ pub(super) struct WholeBus {
 /// A command, and the SubDevice that it addresses; `None`: all.
 type ToSend = (Option<usize>, StartupCommand);
 
+/// Most memory that commands to all may take, as each SubDevice has its own copy: 64 of 1 KiB for 1,000 SubDevices.
+const MAX_BYTES: usize = 64 << 20;
+/// About the memory of a command beside its data.
+const COMMAND: usize = 128;
+
 impl WholeBus {
     /// `stations`: SubDevices by `PhysAddr`.
-    pub fn of(eni: &Eni, stations: &HashMap<u16, usize>, notices: &mut Notices) -> WholeBus {
+    pub fn of(eni: &Eni, stations: &HashMap<u16, usize>, notices: &mut Notices) -> Result<WholeBus, EniError> {
         let mut bus = WholeBus::default();
         let mut declared = Vec::new();
+        let mut bytes = 0_usize;
+        let mut by_position = HashMap::new();
+        for (index, subdevice) in eni.subdevices.iter().enumerate() {
+            subdevice.auto_increment.map(|adp| *by_position.entry(adp).or_insert(index));
+        }
+        let addresses = Addresses { stations, by_position };
         for command in eni.main_device.init_commands.iter().filter(|command| !is_own(command)) {
             let subject = named("Master/InitCmd", &command.comment);
-            match sent(eni, command, stations) {
+            match sent(command, &addresses) {
                 Ok(Way::Declared) => declared.push(command.clone()),
                 Ok(Way::Sent(subdevice, register)) => {
+                    let copies = command.transitions.len() * subdevice.map_or(eni.subdevices.len(), |_| 1);
+                    let size = COMMAND + command.datagram.data.len() + command.comment.len();
+                    bytes = bytes.saturating_add(size.saturating_mul(copies));
+                    if bytes > MAX_BYTES {
+                        let what = "bytes of commands to the whole bus, in each SubDevice";
+                        return Err(EniError::of_file(Problem::TooMuch { what, limit: MAX_BYTES }));
+                    }
                     let commands = planned(command, register, None, &subject, notices);
                     let list = if command.before_subdevices { &mut bus.before } else { &mut bus.behind };
                     list.extend(commands.map(|(_, command): (Place, _)| (subdevice, command)));
@@ -45,7 +63,7 @@ impl WholeBus {
             }
         }
         bus.registers = Registers::after(&declared, &UP);
-        bus
+        Ok(bus)
     }
 
     /// The commands of a SubDevice with those to the whole bus before and behind them.
@@ -79,8 +97,14 @@ fn is_own(command: &EcatCommand) -> bool {
     }
 }
 
+/// SubDevices by the addresses of the file.
+struct Addresses<'a> {
+    stations: &'a HashMap<u16, usize>,
+    by_position: HashMap<u16, usize>,
+}
+
 /// How a command is sent, or why it is not.
-fn sent(eni: &Eni, command: &EcatCommand, stations: &HashMap<u16, usize>) -> Result<Way, String> {
+fn sent(command: &EcatCommand, addresses: &Addresses<'_>) -> Result<Way, String> {
     let code = command.datagram.command;
     let Target::Register { adp, ado } = command.datagram.target else {
         return Err("logical commands to the whole bus are not sent".to_owned());
@@ -89,8 +113,8 @@ fn sent(eni: &Eni, command: &EcatCommand, stations: &HashMap<u16, usize>) -> Res
         return Err("not sent: RingCAT does not use the event requests in datagrams".to_owned());
     }
     let target = match code.addressing() {
-        Addressing::Station => Some(stations.get(&adp).copied()),
-        Addressing::AutoIncrement => Some(eni.subdevices.iter().position(|it| it.auto_increment == Some(adp))),
+        Addressing::Station => Some(addresses.stations.get(&adp).copied()),
+        Addressing::AutoIncrement => Some(addresses.by_position.get(&adp).copied()),
         Addressing::None | Addressing::Broadcast | Addressing::Logical => None,
     };
     if target == Some(None) {

@@ -209,3 +209,21 @@ fn a_broadcast_that_cannot_be_sent_to_each_subdevice_is_noted_with_its_line() {
         assert!(configuration.declaration.subdevices.iter().all(|it| commented(it, "all").is_empty()));
     }
 }
+
+// covers: 8.2, eni-image
+#[test]
+fn commands_to_the_whole_bus_have_a_limit_and_many_on_ways_to_init_take_no_time() {
+    let large = bus(8, 3968, "").replace("<Data>3412</Data>", "<DataLength>1400</DataLength>");
+    let slave = |station: u32| format!("<Slave><Info><Name>S</Name><PhysAddr>{station}</PhysAddr></Info></Slave>");
+    let slaves: String = (1..=3_000).map(slave).collect();
+    let file = |commands: &str| {
+        format!(
+            "<EtherCATConfig><Config><Master><InitCmds>{commands}</InitCmds></Master>{slaves}</Config></EtherCATConfig>"
+        )
+    };
+    assert!(crate::refusal(&file(&large.repeat(20))).contains("commands to the whole bus"));
+    assert_eq!(configured(&file(&large)).declaration.subdevices.len(), 3_000);
+    let own = "<InitCmd><Transition>OI</Transition><Cmd>5</Cmd><Adp>1004</Adp><Ado>3968</Ado><Data>01</Data></InitCmd>";
+    let many = changed(&[(DRIVE, &format!("{}{DRIVE}", own.repeat(60_000)))]);
+    assert_eq!(drive(&many).startup.iter().filter(|it| it.transition == Transition::Oi).count(), 60_001);
+}
