@@ -8,12 +8,15 @@ use ringcat_control::message::{Answer, Query};
 use ringcat_control::socket::to_listen_at;
 use ringcat_link::HeldSignals;
 use ringcat_link::capabilities::{Capabilities, keep};
+use ringcat_link::interface::exclusive_use;
+use ringcat_link::operator::Priority;
 use ringcat_link::process::raise_descriptors;
 
 use crate::daemon::Daemon;
+use crate::device::Device;
 use crate::ethernet::EthernetInterfaces;
 use crate::listening::Prepared;
-use crate::log::{flush, say};
+use crate::log::{flush, print, say};
 use crate::master::{Master, Settings};
 use crate::opener::Opener;
 use crate::owner_lock::OwnerLock;
@@ -56,6 +59,7 @@ pub fn run(setup: &Setup) -> Result<(), String> {
     let mut up_down = UpDown::start(&setup.up_down);
     let mut masters = Vec::new();
     for option in &setup.masters {
+        warn_of_others(option);
         let started = master(setup, option, &path, &opener);
         masters.push(started.map_err(|error| format!("master {}: {error}", option.master))?);
     }
@@ -78,6 +82,17 @@ fn end_with_input() -> Result<(), String> {
     };
     let started = std::thread::Builder::new().name("input".into()).spawn(body);
     started.map(drop).map_err(|error| format!("a thread cannot be started: {error}"))
+}
+
+/// Says what else uses the interfaces of a master, before it has sockets of its own. An interface that is to be chosen
+/// is one that nothing else uses.
+fn warn_of_others(option: &MasterOption) {
+    let named = option.source.devices().filter(|device| **device != Device::First);
+    // One that is not there yet is waited for.
+    let found = named.filter_map(|device| device.find(&[]).ok().flatten());
+    for warning in found.flat_map(|found| exclusive_use(&found.name)) {
+        print(Priority::Warning, format!("ringcatd: master {}: {warning}", option.master));
+    }
 }
 
 /// Starts a master.

@@ -11,11 +11,16 @@ use std::io::{self, Error, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+/// Cycles that a part of a profile has, where it has parts.
+pub const BATCH: u64 = 50;
+
 /// Cost of a run of a program.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Profile {
     /// Instructions in user mode.
     pub instructions: u64,
+    /// The same of each part, if the program was profiled in parts.
+    pub parts: Vec<u64>,
     /// System calls by function. Those of other threads count for the function that ran last.
     pub system_calls: BTreeMap<String, u64>,
     /// Calls by name of the called function, also those outside of the counted function.
@@ -31,7 +36,7 @@ impl Profile {
     pub fn parse(text: &str) -> Option<Profile> {
         let mut profile = Profile::default();
         let (mut called, mut file, mut function) = ("", "", "");
-        let mut totals = None;
+        let mut totals: Option<u64> = None;
         let mut is_of_call = false;
         // Lowest address of each function, and its executions.
         let mut firsts: BTreeMap<&str, (u64, u64)> = BTreeMap::new();
@@ -63,8 +68,10 @@ impl Profile {
                         Ordering::Greater => {}
                     }
                 }
-            } else if let Some(rest) = line.strip_prefix("totals:").or_else(|| line.strip_prefix("summary:")) {
-                totals = rest.split_whitespace().next()?.parse().ok();
+            } else if let Some(rest) = line.strip_prefix("totals:") {
+                let part: u64 = rest.split_whitespace().next()?.parse().ok()?;
+                totals = Some(totals.unwrap_or_default() + part);
+                profile.parts.push(part);
             }
         }
         profile.instructions = totals?;
@@ -97,21 +104,25 @@ pub fn profile_self(arguments: &[String]) -> io::Result<Profile> {
 /// # Errors
 /// As [`profile_self`].
 pub fn profile_self_within(function: &str, arguments: &[String]) -> io::Result<Profile> {
-    profile_program_within(Command::new("valgrind"), &[function], &env::current_exe()?, arguments)
+    profile_program_within(Command::new("valgrind"), &[function], None, &env::current_exe()?, arguments)
 }
 
 /// As [`profile_self_within`], of any program, within several functions that do not call each other, and with a command
-/// that runs valgrind elsewhere.
+/// that runs valgrind elsewhere. With `part` a part ends at each end of this function.
 ///
 /// # Errors
 /// As [`profile_self`].
 pub fn profile_program_within(
     valgrind: Command,
     functions: &[&str],
+    part: Option<&str>,
     program: &Path,
     arguments: &[String],
 ) -> io::Result<Profile> {
-    let options: Vec<String> = functions.iter().map(|function| format!("--toggle-collect={function}")).collect();
+    let mut options: Vec<String> = functions.iter().map(|function| format!("--toggle-collect={function}")).collect();
+    if let Some(part) = part {
+        options.extend([format!("--dump-after={part}"), "--combine-dumps=yes".to_owned()]);
+    }
     profile(valgrind, &options, program, arguments)
 }
 

@@ -190,3 +190,18 @@ fn interfaces_are_switched_with_the_daemon_but_not_under_an_application() {
     child.kill().expect("it runs");
     child.wait().expect("it has ended");
 }
+
+// covers: daemon, other-main-device
+#[test]
+fn other_users_of_an_interface_that_is_named_are_told_at_the_start() {
+    let Some(mut bench) = Bench::make(LINE, &[0]) else { return };
+    ip(&format!("-n {} address add 192.0.2.1/24 dev near0", bench.near));
+    bench.start_segment("0");
+    bench.start_daemon(&["--master", "0=near0"]);
+    bench.wait_for(AlState::PreOp);
+    bench.wait_for_line("ringcatd: master 0: near0 has the IP address 192.0.2.1, so other programs send");
+    // A second daemon is told of the first one's sockets.
+    let socket = bench.place.join("second");
+    bench.start_daemon_at(&socket, &["--master", "0=near0"]);
+    bench.wait_for_line("receives EtherCAT frames on near0 already");
+}

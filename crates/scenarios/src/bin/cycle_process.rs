@@ -13,6 +13,7 @@ use ringcat::{
     AcyclicHalf, AlState, Application, DomainId, LastOutputs, MainDevice, Options, ProcessData, SupervisorThread,
     automatic, realtime,
 };
+use scenarios::callgrind::BATCH;
 use scenarios::cpu_time::process_cpu_time;
 
 type Tried<T> = Result<T, String>;
@@ -96,8 +97,8 @@ fn exchange<H: AcyclicHalf>(application: &mut Application<PacketLinks, H>, cycle
         application.cycle(work);
     }
     let (before, cpu, begin) = (application.cyclic_counters(), process_cpu_time(), application.now());
-    for _ in 0..cycles {
-        measured_cycle(application);
+    for _ in 0..cycles / BATCH {
+        measured_batch(application);
     }
     let (cpu, elapsed) = (process_cpu_time() - cpu, application.now().since(begin));
     let after = application.cyclic_counters();
@@ -110,6 +111,14 @@ fn exchange<H: AcyclicHalf>(application: &mut Application<PacketLinks, H>, cycle
         println!("{name}: {kilobytes} kB");
     }
     Ok(())
+}
+
+/// Cycles that are counted together.
+#[inline(never)]
+fn measured_batch<H: AcyclicHalf>(application: &mut Application<PacketLinks, H>) {
+    for _ in 0..BATCH {
+        measured_cycle(application);
+    }
 }
 
 /// A cycle that is counted.
