@@ -16,10 +16,12 @@ mod image;
 mod mail;
 mod messages;
 mod notices;
+mod register_commands;
 mod registers;
 mod subdevice;
 mod sync_managers;
 mod transitions;
+mod whole_bus;
 
 pub(crate) use subdevice::states;
 

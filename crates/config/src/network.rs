@@ -3,8 +3,10 @@
 //! described in `docs/network-file.md`.
 
 mod check;
+mod commands;
 mod declare;
 mod error;
+mod esi_differences;
 mod esi_names;
 mod from_esi;
 mod from_scan;

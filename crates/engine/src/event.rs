@@ -20,6 +20,7 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::mailbox::Protocol;
 use ringcat_wire::mailbox::coe::Emergency;
+use ringcat_wire::mailbox::soe::Idn;
 use ringcat_wire::sii::Identity;
 
 pub use clients::{ClientEvents, ClientId};
@@ -89,8 +90,7 @@ pub enum Event {
         /// The segment was not as known: what differs was scanned.
         differs: bool,
     },
-    /// The former owner has handed the segment over in the middle of a conversation with a mailbox. An SDO transfer and
-    /// a file are aborted at the SubDevice; the mailbox can be used.
+    /// The hand-over of the segment has cut a conversation with a mailbox: an SDO transfer and a file are aborted.
     ConversationCut {
         /// Position.
         position: Position,
@@ -223,8 +223,7 @@ pub enum Event {
         /// The cable that is restored: the last located break, if any.
         place: Option<Cable>,
     },
-    /// The ring opens and closes so often that single changes are no longer reported. The next report follows when the
-    /// ring has been stable for a second.
+    /// The ring opens and closes so often that changes are not reported until it has been stable for a second.
     RingUnsteady {
         /// Number of changes since activation.
         changes: u32,
@@ -296,7 +295,7 @@ pub enum Event {
         /// The setting.
         what: String,
     },
-    /// A start-up command read an object with another value than required.
+    /// A start-up command read an object.
     StartupRead {
         /// Index in the declaration.
         subdevice: SubDeviceId,
@@ -309,6 +308,21 @@ pub enum Event {
         /// Purpose of the command, from its declaration.
         comment: Option<String>,
         /// The value read.
+        data: Vec<u8>,
+    },
+    /// A start-up command read an IDN (protocol 6.6).
+    StartupIdn {
+        /// Index in the declaration.
+        subdevice: SubDeviceId,
+        /// Number of the command in the declaration, from 0.
+        number: usize,
+        /// Drive of the SubDevice.
+        drive: u8,
+        /// The IDN.
+        idn: Idn,
+        /// Purpose of the command, from its declaration.
+        comment: Option<String>,
+        /// The data of its elements.
         data: Vec<u8>,
     },
     /// A SubDevice sent a CoE emergency (protocol 6.3). The mailbox of each SubDevice also keeps its last ones.
@@ -459,16 +473,14 @@ pub enum Event {
         /// Step and reason.
         reason: String,
     },
-    /// Clocks were not locked in time, and a SubDevice with SYNC signals went on without
-    /// (`WhenUnlocked::GoOn`).
+    /// Clocks were not locked in time, and a SubDevice with SYNC signals went on (`WhenUnlocked::GoOn`).
     WentOnUnlocked {
         /// Index in the declaration.
         subdevice: SubDeviceId,
         /// The clock that is not locked, and its difference.
         reason: String,
     },
-    /// The clocks follow another time of the application: one that it has set for the first time, or after a jump. Both
-    /// values are signed.
+    /// The clocks follow another time of the application, its first one or after a jump. Both values are signed.
     ApplicationTime {
         /// Nanoseconds by which the system time of all clocks has jumped; 0 while SYNC signals run.
         jump_ns: i64,

@@ -166,9 +166,10 @@ pub use ringcat_engine::StopError;
 pub use ringcat_engine::Urgency;
 pub use ringcat_engine::config::{
     ClockConfig, ConfigAddress, ConfigError, DeclaredArea, DeclaredSyncManager, Expected, Group, IdentityField,
-    IdnWrite, IpSettings, ModeError, Passage, PdoAssignment, PdoEntry, PdoMapping, PulseGrid, ReferenceClock,
-    RefusedPdos, RegisterAccess, RegisterCommand, SdoDownload, SdoUpload, StartupAction, StartupCommand, StateTimeout,
-    SubDeviceConfig, SyncManagerRole, SyncSignals, Timeouts, Transition, Watchdog, WhenUnlocked,
+    IdnRead, IdnWrite, IpSettings, MailMessage, ModeError, Passage, PdoAssignment, PdoEntry, PdoMapping, PulseGrid,
+    ReferenceClock, RefusedPdos, RegisterAccess, RegisterCommand, SdoDownload, SdoUpload, StartupAction,
+    StartupCommand, StateTimeout, SubDeviceConfig, SyncManagerRole, SyncSignals, Timeouts, Transition, Watchdog,
+    WhenUnlocked,
 };
 pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
 pub use ringcat_engine::event::{

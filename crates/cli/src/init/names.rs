@@ -23,7 +23,8 @@ pub struct Named {
     pub names: usize,
 }
 
-/// Fills in names from the description that counts for each SubDevice. Each file is read once.
+/// Fills in names from the description that counts for each SubDevice, and reports where both disagree. Each file is
+/// read once.
 pub fn fill(file: &mut NetworkFile, found: &[SubDeviceInfo], folder: &Path) -> Result<Named, Failure> {
     let kept = EsiFolder::default_index(folder);
     let folder = EsiFolder::open(folder, kept.as_deref()).map_err(|error| Failure::new(error.to_string()))?;
@@ -47,6 +48,11 @@ pub fn fill(file: &mut NetworkFile, found: &[SubDeviceInfo], folder: &Path) -> R
             let device = esi.devices.iter().find(|it| (it.product_code, it.revision) == wanted);
             if let Some(device) = device {
                 named.described += 1;
+                let subdevice = &file.subdevice[*at];
+                for difference in subdevice.differences_to_esi(device) {
+                    let (position, name, path) = (found[*at].position, &subdevice.name, &described.file.path);
+                    warn(format!("position {position} \"{name}\": {difference} ({path}): the device counts"));
+                }
                 named.names += file.subdevice[*at].name_from_esi(device, LANGUAGE);
             }
         }

@@ -52,6 +52,10 @@ pub(super) fn complete(
     use Transition::{Bi, Ib, Ip, Oi, Op, Os, Pi, Po, Ps, Si, So, Sp};
     let mut out = Commands { own, list: Vec::new() };
     out.state(config, &[Pi, Si, Oi, Bi], AlState::Init);
+    for transition in [EngineTransition::Pi, EngineTransition::Si, EngineTransition::Oi, EngineTransition::Bi] {
+        out.raw(config, transition);
+    }
+    out.raw(config, EngineTransition::Ii);
     out.begin(config);
     let (mailboxes, data): (Vec<_>, Vec<_>) = declared.iter().partition(|it| it.role.direction().is_none());
     mailboxes.iter().for_each(|it| out.clear_sync_manager(&[Ip, Ib, Pi, Si, Oi], it.index));
@@ -59,6 +63,7 @@ pub(super) fn complete(
     if let Some(both) = &config.declared_bootstrap {
         both.iter().for_each(|it| out.sync_manager(Ib, it.index, &it.register));
     }
+    out.raw(config, EngineTransition::Ib);
     out.state(config, &[Ib], AlState::Boot);
     out.raw(config, EngineTransition::Ip);
     if config.sii_to_pdi {
@@ -76,9 +81,11 @@ pub(super) fn complete(
     for (comment, ado, data) in config.sync.iter().flat_map(clocks::registers) {
         out.write(&[Ps], comment, ado, data);
     }
+    out.raw(config, EngineTransition::Pp);
     out.raw(config, EngineTransition::Ps);
     out.state(config, &[Ps], AlState::SafeOp);
     data.iter().filter(|it| it.op_only).for_each(|it| out.sync_manager(So, it.index, &it.register));
+    out.raw(config, EngineTransition::Ss);
     out.raw(config, EngineTransition::So);
     out.state(config, &[So, Po], AlState::Op);
     out.raw(config, EngineTransition::Os);

@@ -31,6 +31,8 @@ pub(super) fn mailbox(
             Some(Section::CoE) => "CoE",
             Some(Section::SoE) => "SoE",
             Some(Section::EoE) => "EoE",
+            Some(Section::AoE) => "AoE",
+            Some(Section::VoE) => "VoE",
             Some(Section::Registers) | None => continue,
         };
         if !mailbox.protocols.iter().any(|protocol| protocol == name) {

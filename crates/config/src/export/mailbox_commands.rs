@@ -1,17 +1,20 @@
-//! Start-up commands through the mailbox: CoE, SoE, EoE.
+//! Start-up commands through the mailbox: CoE, SoE, EoE, AoE, VoE.
 
-use ringcat_engine::config::{IdnWrite, IpSettings, SdoDownload, SdoUpload, StartupAction, StartupCommand};
+use ringcat_engine::config::{
+    IdnRead, IdnWrite, IpSettings, MailMessage, SdoDownload, SdoUpload, StartupAction, StartupCommand,
+};
 
 use super::init_commands::ms;
 use super::order::{Order, Section, place};
 use super::transitions::transition;
-use crate::eni::{CoeCommand, EoeCommand, Mailbox, SoeCommand};
+use crate::eni::{CoeCommand, EoeCommand, Mailbox, Place, RawMailCommand, SoeCommand};
 use crate::ip;
 
 /// `Ccs`.
 const DOWNLOAD: u8 = 1;
 const UPLOAD: u8 = 2;
-/// `OpCode` and `Elements` of a write of the value.
+/// `OpCode` of a read; `OpCode` and `Elements` of a write of the value.
+const SOE_READ: u8 = 2;
 const SOE_WRITE: u8 = 3;
 const SOE_VALUE: u8 = 0x40;
 
@@ -22,6 +25,13 @@ pub(super) fn add(startup: &[StartupCommand], order: &Order, mailbox: &mut Mailb
             StartupAction::Sdo(of) => mailbox.coe.push(download(command, of, order)),
             StartupAction::Upload(of) => mailbox.coe.push(upload(command, of, order)),
             StartupAction::Idn(of) => mailbox.soe.push(idn(command, of, order)),
+            StartupAction::IdnRead(of) => mailbox.soe.push(idn_read(command, of, order)),
+            StartupAction::Mail(MailMessage::Aoe(data)) => {
+                mailbox.others.push(message(command, "AoE", data, place(order, Section::AoE)));
+            }
+            StartupAction::Mail(MailMessage::Voe(data)) => {
+                mailbox.others.push(message(command, "VoE", data, place(order, Section::VoE)));
+            }
             StartupAction::Ip(of) => mailbox.eoe.push(settings(command, of, order)),
             _ => {}
         }
@@ -79,6 +89,23 @@ fn idn(command: &StartupCommand, of: &IdnWrite, order: &Order) -> SoeCommand {
         elements: SOE_VALUE,
         attribute: 0,
         data: of.data.clone(),
+        disabled: false,
+    }
+}
+
+fn idn_read(command: &StartupCommand, of: &IdnRead, order: &Order) -> SoeCommand {
+    let written = idn(command, &IdnWrite::new(of.drive, of.idn, of.expected.clone().unwrap_or_default()), order);
+    SoeCommand { op_code: SOE_READ, elements: of.elements.0, ..written }
+}
+
+fn message(command: &StartupCommand, protocol: &'static str, data: &[u8], place: Place) -> RawMailCommand {
+    RawMailCommand {
+        place,
+        protocol,
+        transitions: vec![transition(command.transition)],
+        comment: command.comment.clone().unwrap_or_default(),
+        timeout_ms: limit(command),
+        data: data.to_vec(),
         disabled: false,
     }
 }

@@ -1,61 +1,79 @@
 //! The order of start-up commands: an ENI has commands to registers and those of each protocol in sections of their
 //! own, and within a transition they are sent in the order of the sections.
 
-use ringcat_engine::config::{StartupAction, StartupCommand, Transition};
+use ringcat_engine::config::{MailMessage, StartupAction, StartupCommand, Transition};
 
 use crate::eni::Place;
 
 /// A section with start-up commands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Section {
-    Registers,
     CoE,
     SoE,
     EoE,
+    AoE,
+    VoE,
+    Registers,
 }
 
 /// Sections in their order.
-pub(super) type Order = [Section; 4];
+pub(super) type Order = [Section; 6];
 
-/// The possible orders, first that of the schema. The sections of mailbox protocols are together.
-const ORDERS: [Order; 12] = {
-    use Section::{CoE, EoE, Registers as R, SoE};
-    [
-        [CoE, SoE, EoE, R],
-        [R, CoE, SoE, EoE],
-        [CoE, EoE, SoE, R],
-        [SoE, CoE, EoE, R],
-        [SoE, EoE, CoE, R],
-        [EoE, CoE, SoE, R],
-        [EoE, SoE, CoE, R],
-        [R, CoE, EoE, SoE],
-        [R, SoE, CoE, EoE],
-        [R, SoE, EoE, CoE],
-        [R, EoE, CoE, SoE],
-        [R, EoE, SoE, CoE],
-    ]
-};
-const TRANSITIONS: [Transition; 5] = [Transition::Ip, Transition::Ps, Transition::So, Transition::Os, Transition::Sp];
+/// Those of mailbox protocols, which are together, in the order of the schema.
+const PROTOCOLS: [Section; 5] = [Section::CoE, Section::SoE, Section::EoE, Section::AoE, Section::VoE];
 
 pub(super) const fn section(action: &StartupAction) -> Option<Section> {
     match action {
         StartupAction::Register(_) => Some(Section::Registers),
         StartupAction::Sdo(_) | StartupAction::Upload(_) => Some(Section::CoE),
-        StartupAction::Idn(_) => Some(Section::SoE),
+        StartupAction::Idn(_) | StartupAction::IdnRead(_) => Some(Section::SoE),
         StartupAction::Ip(_) => Some(Section::EoE),
+        StartupAction::Mail(MailMessage::Aoe(_)) => Some(Section::AoE),
+        StartupAction::Mail(MailMessage::Voe(_)) => Some(Section::VoE),
         _ => None,
     }
 }
 
-/// An order of the sections in which the commands of each transition are sent in the same order as these.
+/// An order of the sections in which the commands of each transition are sent in the same order as these: the registers
+/// behind the mailbox, as in the schema, or before it.
 pub(super) fn order(commands: &[StartupCommand]) -> Option<Order> {
-    ORDERS.into_iter().find(|order| {
-        TRANSITIONS.into_iter().all(|transition| {
-            let of_transition = commands.iter().filter(|command| command.transition == transition);
-            let sections = of_transition.filter_map(|command| section(&command.action));
-            sections.map(|section| rank(order, section)).is_sorted()
-        })
-    })
+    let sequence = |transition| {
+        let of_transition = commands.iter().filter(|command| command.transition == transition);
+        let mut sections: Vec<Section> = of_transition.filter_map(|command| section(&command.action)).collect();
+        sections.dedup();
+        sections
+    };
+    let sequences = Transition::ALL.map(sequence);
+    let is_kept = |order: &Order| {
+        sequences.iter().all(|sections| sections.iter().map(|section| rank(order, *section)).is_sorted())
+    };
+    if sequences.iter().any(|sections| sections.len() > PROTOCOLS.len() + 1) {
+        return None;
+    }
+    let (mut protocols, mut found) = (PROTOCOLS, None);
+    permutations(&mut protocols, 0, &mut |[a, b, c, d, e]| {
+        let registers = Section::Registers;
+        let orders = [[*a, *b, *c, *d, *e, registers], [registers, *a, *b, *c, *d, *e]];
+        found = found.or_else(|| orders.into_iter().find(is_kept));
+        found.is_some()
+    });
+    found
+}
+
+/// Calls `done` with the permutations of a list from a place on, first the list itself, until it returns true.
+fn permutations(list: &mut [Section; 5], from: usize, done: &mut impl FnMut(&[Section; 5]) -> bool) -> bool {
+    if from + 1 >= list.len() {
+        return done(list);
+    }
+    for place in from..list.len() {
+        list[from..=place].rotate_right(1);
+        let is_done = permutations(list, from + 1, done);
+        list[from..=place].rotate_left(1);
+        if is_done {
+            return true;
+        }
+    }
+    false
 }
 
 fn rank(order: &Order, section: Section) -> usize {

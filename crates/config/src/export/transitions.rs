@@ -12,5 +12,13 @@ pub(super) const fn transition(of: EngineTransition) -> Transition {
         EngineTransition::So => Transition::So,
         EngineTransition::Os => Transition::Os,
         EngineTransition::Sp => Transition::Sp,
+        EngineTransition::Ii => Transition::Ii,
+        EngineTransition::Pp => Transition::Pp,
+        EngineTransition::Ss => Transition::Ss,
+        EngineTransition::Pi => Transition::Pi,
+        EngineTransition::Si => Transition::Si,
+        EngineTransition::Oi => Transition::Oi,
+        EngineTransition::Ib => Transition::Ib,
+        EngineTransition::Bi => Transition::Bi,
     }
 }

@@ -1,14 +1,14 @@
-//! Positions of the SubDevices, hot connect groups and upstream connections; commands for the whole bus.
+//! Positions of the SubDevices, hot connect groups and upstream connections.
 
 use std::collections::{HashMap, HashSet};
 
 use ringcat_engine::config::ConfigAddress;
 use ringcat_wire::address::Position;
-use ringcat_wire::command::Command;
 
-use super::messages::{command_name, contradiction, label, named};
+use super::messages::{contradiction, label};
 use super::notices::Notices;
-use crate::eni::{EcatCommand, Eni, EniError, Poll, Port, Target};
+use super::whole_bus::WholeBus;
+use crate::eni::{Eni, EniError, Poll, Port};
 
 /// Positions and connections of the SubDevices.
 pub(super) struct Bus {
@@ -20,6 +20,8 @@ pub(super) struct Bus {
     pub plugged_into: Vec<Option<(usize, Port)>>,
     /// Whether the file reverses `Ccs`: 2 downloads.
     pub ccs_is_reversed: bool,
+    /// Commands to the whole bus.
+    pub commands: WholeBus,
 }
 
 impl Bus {
@@ -31,10 +33,8 @@ impl Bus {
             plugged_into: plugged_into(eni, &stations)?,
             groups,
             ccs_is_reversed: ccs_is_reversed(eni),
+            commands: WholeBus::of(eni, &stations, notices)?,
         };
-        for command in &eni.main_device.init_commands {
-            of_whole_bus(command, notices);
-        }
         of_mailboxes(eni, notices);
         if eni.main_device.eoe {
             let reason = "RingCAT bridges Ethernet with the option --eoe of the program, not from the file";
@@ -159,36 +159,6 @@ fn ccs_is_reversed(eni: &Eni) -> bool {
     let mut commands = eni.subdevices.iter().flat_map(|subdevice| &subdevice.mailbox).flat_map(|mailbox| &mailbox.coe);
     let is_there = commands.clone().next().is_some();
     is_there && commands.all(|command| command.ccs == 2 && !command.data.is_empty())
-}
-
-/// A command for the whole bus. RingCAT resets the registers that it uses, and sends none of these commands.
-fn of_whole_bus(command: &EcatCommand, notices: &mut Notices) {
-    let zero = command.datagram.data.iter().all(|byte| *byte == 0);
-    let ours = match command.datagram.target {
-        Target::Logical(_) => false,
-        Target::Register { ado, .. } => match ado.0 {
-            0x0010..=0x0011 | 0x0120..=0x0135 | 0x0300..=0x0313 | 0x0500..=0x050F => true,
-            0x0600..=0x06FF | 0x0800..=0x08FF | 0x0900..=0x09FF => true,
-            // The second address is always disabled.
-            0x0103 => zero,
-            _ => command.datagram.command == Command::Nop,
-        },
-    };
-    if !ours {
-        let reason = match command.datagram.target {
-            Target::Register { ado, .. } if ado.0 == 0x0200 => {
-                "not sent: RingCAT does not use the event requests in datagrams".to_owned()
-            }
-            Target::Register { ado, .. } => {
-                format!(
-                    "{} to register {ado}: commands to the whole bus are not sent",
-                    command_name(command.datagram.command)
-                )
-            }
-            Target::Logical(_) => "logical commands to the whole bus are not sent".to_owned(),
-        };
-        notices.add(Some(command.place), None, named("Master/InitCmd", &command.comment), reason);
-    }
 }
 
 /// Detection of full mailboxes.

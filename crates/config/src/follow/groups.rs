@@ -19,10 +19,10 @@ pub(super) fn follow(eni: &Eni, bus: &Bus, configs: &mut [SubDeviceConfig]) -> R
             Some(Mark::Identification(value)) => Ok(ConfigAddress::Identification { value, offset }),
             Some(Mark::Alias(_) | Mark::Eeprom { .. } | Mark::EepromWord { .. }) | None => {
                 let what = format!("identification of the hot connect group {}", crate::eni::quoted(&group.name));
-                let expected = "an IdentifyCmd that compares the alias (register 0x0012 or EEPROM word 4) or the \
-                                identification (register 0x0134)";
+                let expected = "an IdentifyCmd that compares the alias (register 0x0012 or EEPROM word 4), the \
+                                identification (register 0x0134) or a whole data word (from 0x0F00)";
                 let got = format!("{} commands, none of that kind", group.identify.len());
-                let hint = "RingCAT does not support other kinds of identification, such as a data word";
+                let hint = "RingCAT does not support other kinds of identification";
                 Err(contradiction(eni, index, group.place, what, expected, got, hint))
             }
         };

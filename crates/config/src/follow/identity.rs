@@ -26,9 +26,12 @@ pub(super) enum Mark {
     },
     /// The alias, read from its register.
     Alias(u16),
-    /// The identification in AL status code (protocol 5.3).
+    /// The identification in AL status code (protocol 5.3), or in a word of its memory (protocol 4.3).
     Identification(u16),
 }
+
+/// Memory in which a SubDevice may have its identification: digital inputs, user RAM, process RAM (protocol 3.13).
+const MEMORY: std::ops::RangeInclusive<u16> = 0x0F00..=0xFFFE;
 
 const WORD_ALIAS: u32 = 0x0004;
 const WORD_VENDOR: u32 = 0x0008;
@@ -69,6 +72,9 @@ pub(super) fn marks(commands: &[EcatCommand]) -> Vec<(Mark, bool, Place)> {
             }
             map::STATION_ALIAS => found.extend(first_word.map(|alias| (Mark::Alias(alias), whole, command.place))),
             map::AL_STATUS_CODE => {
+                found.extend(first_word.map(|id| (Mark::Identification(id), whole, command.place)));
+            }
+            word if MEMORY.contains(&word.0) && validate.data.len() == 2 => {
                 found.extend(first_word.map(|id| (Mark::Identification(id), whole, command.place)));
             }
             _ => {}

@@ -1,20 +1,23 @@
-//! Commands through mailboxes: CoE, SoE and EoE become start-up commands (protocol 6, 8.1).
+//! Commands through mailboxes: those of CoE, SoE, EoE, AoE and VoE become start-up commands (protocol 6, 8.1).
 
 use std::net::Ipv4Addr;
 use std::time::Duration;
 
-use ringcat_engine::config::{IdnWrite, IpSettings, SdoDownload, SdoUpload, StartupAction, StartupCommand};
-use ringcat_wire::mailbox::soe::Idn;
+use ringcat_engine::config::{
+    IdnRead, IdnWrite, IpSettings, MailMessage, SdoDownload, SdoUpload, StartupAction, StartupCommand,
+};
+use ringcat_wire::mailbox::soe::{Idn, SoeElements};
 
 use super::bus::Bus;
 use super::messages::{contradiction, named};
 use super::notices::Notices;
-use super::transitions::{at_transitions, comment};
-use crate::eni::{CoeCommand, Eni, EniError, EoeCommand, Place, SoeCommand, Transition};
+use super::transitions::{Planned, comment};
+use crate::eni::{CoeCommand, Eni, EniError, EoeCommand, Place, RawMailCommand, SoeCommand, Transition};
 use crate::ip;
 
-/// SoE: the element flag of the value of an IDN, and the op code of a write.
+/// SoE: the element flag of the value of an IDN, and the op codes of a read and a write.
 const SOE_VALUE: u8 = 0x40;
+const SOE_READ: u8 = 2;
 const SOE_WRITE: u8 = 3;
 /// Drives of a SubDevice (protocol 6.6).
 const SOE_DRIVES: u8 = 8;
@@ -30,11 +33,10 @@ pub(super) fn startup(
     let Some(mailbox) = &eni.subdevices[index].mailbox else { return Ok(()) };
     let mut add =
         |place, transitions: &[Transition], subject: &str, timeout_ms, words: &str, action, notices: &mut Notices| {
-            startup.extend(at_transitions(place, transitions, index, subject, notices, |transition| {
-                StartupCommand::new(transition, StartupAction::clone(&action))
-                    .with_limit(limit(timeout_ms))
-                    .with_comment(comment(words))
-            }));
+            let planned = Planned { place, transitions, subdevice: Some(index), subject, action };
+            let commands = planned.at_transitions(notices).into_iter();
+            let whole = |command: StartupCommand| command.with_limit(limit(timeout_ms)).with_comment(comment(words));
+            startup.extend(commands.map(|(place, command)| (place, whole(command))));
         };
     if bus.ccs_is_reversed && !mailbox.coe.is_empty() {
         let reason = "2 in all commands, and all have data: taken as downloads, as some tools write them";
@@ -71,7 +73,11 @@ pub(super) fn startup(
     }
     for command in mailbox.others.iter().filter(|command| !command.disabled) {
         let subject = named(&format!("{}/InitCmd", command.protocol), &command.comment);
-        notices.add(Some(command.place), Some(index), subject, "mailbox commands of this protocol are not sent");
+        let RawMailCommand { place, transitions, timeout_ms, comment, .. } = command;
+        match message(command).map(StartupAction::Mail) {
+            Ok(action) => add(*place, transitions, &subject, *timeout_ms, comment, action, notices),
+            Err(reason) => notices.add(Some(*place), Some(index), subject, reason),
+        }
     }
     Ok(())
 }
@@ -97,16 +103,31 @@ fn sdo(command: &CoeCommand, is_reversed: bool) -> Result<StartupAction, &'stati
 }
 
 fn idn(command: &SoeCommand) -> Result<StartupAction, String> {
-    if command.op_code != SOE_WRITE {
-        return Err(format!("OpCode {}: only writes (3) are sent", command.op_code));
-    }
-    if command.elements != SOE_VALUE {
-        return Err(format!("Elements {:#04x}: only values (0x40) are written, and alone", command.elements));
-    }
     if command.drive >= SOE_DRIVES {
         return Err(format!("DriveNo {}: a SubDevice has drives 0 to 7", command.drive));
     }
-    Ok(StartupAction::Idn(IdnWrite::new(command.drive, Idn(command.idn), command.data.clone())))
+    let (drive, idn, data) = (command.drive, Idn(command.idn), command.data.clone());
+    match (command.op_code, command.elements) {
+        (SOE_READ, 0) => Err("Elements 0x00: there is nothing to read".to_owned()),
+        (SOE_READ, elements) => {
+            let read = IdnRead::new(drive, idn).with_elements(SoeElements(elements));
+            Ok(StartupAction::IdnRead(read.with_expected((!data.is_empty()).then_some(data))))
+        }
+        (SOE_WRITE, SOE_VALUE) => Ok(StartupAction::Idn(IdnWrite::new(drive, idn, data))),
+        (SOE_WRITE, elements) => Err(format!("Elements {elements:#04x}: only values (0x40) are written, and alone")),
+        (op_code, _) => Err(format!("OpCode {op_code}: only reads (2) and writes (3) are sent")),
+    }
+}
+
+/// A message of AoE or VoE. A transfer of FoE consists of several messages that depend on the answers.
+fn message(command: &RawMailCommand) -> Result<MailMessage, &'static str> {
+    let data = command.data.clone();
+    let (message, reason) = match command.protocol {
+        "AoE" => (MailMessage::Aoe(data), "its Data is no AMS header with a request: not sent"),
+        "VoE" => (MailMessage::Voe(data), "its Data is no VoE header with data: not sent"),
+        _ => return Err("a file is not transferred by one message: not sent"),
+    };
+    if message.is_sound() { Ok(message) } else { Err(reason) }
 }
 
 /// The IP settings, from separate elements or from the message.

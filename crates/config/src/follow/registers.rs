@@ -8,6 +8,9 @@ use ringcat_wire::register::{Fmmu, SyncManager, map};
 
 use crate::eni::{EcatCommand, Place, Target, Transition};
 
+/// The transitions to OP, in the order of sending.
+pub(super) const UP: [Transition; 3] = [Transition::Ip, Transition::Ps, Transition::So];
+
 /// Registers that were written, by address, each with the command that wrote it last.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Registers {

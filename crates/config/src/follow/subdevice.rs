@@ -2,24 +2,19 @@
 
 use std::time::Duration;
 
-use ringcat_engine::config::{
-    DeclaredSyncManager, RegisterAccess, RegisterCommand, StartupAction, StartupCommand, StateTimeout, SubDeviceConfig,
-};
+use ringcat_engine::config::{DeclaredSyncManager, StartupCommand, StateTimeout, SubDeviceConfig};
 use ringcat_wire::al::AlState;
-use ringcat_wire::command::{Addressing, Command};
+use ringcat_wire::command::Addressing;
 use ringcat_wire::register::{SyncManager, map};
 
 use super::areas::{self, Piece};
 use super::bus::Bus;
 use super::messages::{command_name, contradiction, named};
 use super::notices::Notices;
-use super::registers::{Registers, is_complete};
-use super::transitions::{at_transitions, comment};
+use super::register_commands::{Class, NotSent, class, is_write, planned, register_command};
+use super::registers::{Registers, UP, is_complete};
 use super::{assignment, clocks, identity, mail, sync_managers};
 use crate::eni::{EcatCommand, Eni, EniError, Place, Target, Transition};
-
-/// The transitions to OP, in the order of sending.
-pub(super) const UP: [Transition; 3] = [Transition::Ip, Transition::Ps, Transition::So];
 
 /// The declaration of a SubDevice and the mapping of its process data.
 pub(super) fn follow(
@@ -34,9 +29,10 @@ pub(super) fn follow(
     let complete = is_complete(commands);
     let mut config = SubDeviceConfig::at(bus.addresses[index]);
     config.expected = identity::expected(eni, index, complete)?;
-    config.watchdog_divider = registers.word(map::WATCHDOG_DIVIDER);
-    config.pdi_watchdog_intervals = registers.word(map::WATCHDOG_TIME_PDI);
-    config.watchdog_intervals = registers.word(map::WATCHDOG_TIME_PROCESS_DATA);
+    let word = |register| registers.word(register).or_else(|| bus.commands.registers.word(register));
+    config.watchdog_divider = word(map::WATCHDOG_DIVIDER);
+    config.pdi_watchdog_intervals = word(map::WATCHDOG_TIME_PDI);
+    config.watchdog_intervals = word(map::WATCHDOG_TIME_PROCESS_DATA);
     config.sii_to_pdi = identity::keeps_eeprom(commands);
     config.declared = sync_managers::declared(eni, index, &registers, complete, notices)?;
     if config.declared.is_none() {
@@ -45,6 +41,7 @@ pub(super) fn follow(
     config.declared_bootstrap = sync_managers::bootstrap(eni, index)?;
     config.sync = clocks::of_subdevice(eni, index, &registers, complete, notices);
     let mut startup: Vec<(Place, StartupCommand)> = Vec::new();
+    let requests = requests_of_init(commands);
     let mut eeprom_address = None;
     for command in commands {
         if !is_own(eni, index, command, bus, notices) {
@@ -57,7 +54,7 @@ pub(super) fn follow(
         match class(command) {
             Class::Handled if identity::is_sent(command, eeprom_address) => {
                 for command in eeprom_address.into_iter().chain([command]) {
-                    raw(eni, index, command, &mut startup, notices)?;
+                    raw(eni, index, command, &requests, &mut startup, notices)?;
                 }
             }
             Class::Handled => {}
@@ -65,13 +62,14 @@ pub(super) fn follow(
             Class::Refused(reason) => {
                 notices.add(Some(command.place), Some(index), named("InitCmd", &command.comment), reason)
             }
-            Class::Raw => raw(eni, index, command, &mut startup, notices)?,
+            Class::Raw => raw(eni, index, command, &requests, &mut startup, notices)?,
         }
     }
     late_sync_managers(index, commands, &registers, config.declared.as_deref_mut().unwrap_or_default(), notices);
     mail::startup(eni, index, bus, &mut startup, notices)?;
     startup.sort_by_key(|(place, _)| *place);
-    config.startup = startup.into_iter().map(|(_, command)| command).collect();
+    let own = startup.into_iter().map(|(_, command)| command);
+    config.startup = bus.commands.around(index, own);
     let pieces = areas::pieces(eni, index, config.declared.as_deref().unwrap_or_default(), &registers, notices)?;
     Ok((config, pieces))
 }
@@ -112,36 +110,6 @@ fn is_own(eni: &Eni, index: usize, command: &EcatCommand, bus: &Bus, notices: &m
     }
 }
 
-/// How a command is handled.
-enum Class {
-    /// RingCAT performs it itself, or it has become part of the declaration.
-    Handled,
-    /// A state change or the check of its result.
-    State,
-    /// Sent unchanged.
-    Raw,
-    /// Not sent.
-    Refused(&'static str),
-}
-
-/// The class by the addressed register (protocol 3).
-fn class(command: &EcatCommand) -> Class {
-    let Target::Register { ado, .. } = command.datagram.target else { return Class::Handled };
-    let zero = command.datagram.data.iter().all(|byte| *byte == 0);
-    match ado.0 {
-        0x0010..=0x0011 => Class::Handled,
-        0x0100..=0x0117 => Class::Refused("RingCAT controls ports and forwarding: not sent"),
-        0x0120..=0x0137 => Class::State,
-        0x0300..=0x0313 => Class::Handled,
-        0x0400 | 0x0410 | 0x0420 => Class::Handled,
-        0x0500..=0x050F => Class::Handled,
-        0x0600..=0x06FF | 0x0800..=0x087F => Class::Handled,
-        0x0900..=0x0937 | 0x0980..=0x09A7 => Class::Handled,
-        0x09A8..=0x09A9 if zero => Class::Handled,
-        _ => Class::Raw,
-    }
-}
-
 /// Checks that the written station address equals `PhysAddr`.
 fn check_addresses(eni: &Eni, index: usize, command: &EcatCommand) -> Result<(), EniError> {
     let Target::Register { ado, .. } = command.datagram.target else { return Ok(()) };
@@ -156,10 +124,6 @@ fn check_addresses(eni: &Eni, index: usize, command: &EcatCommand) -> Result<(),
     let what = "the station address that is set";
     let hint = "PhysAddr and the command to register 0x0010 must agree: export the file again";
     Err(contradiction(eni, index, command.place, what, station.to_string(), written.to_string(), hint))
-}
-
-fn is_write(command: Command) -> bool {
-    command.writes() && !command.reads()
 }
 
 /// Source and target state of a transition.
@@ -226,43 +190,58 @@ fn raw(
     eni: &Eni,
     index: usize,
     command: &EcatCommand,
+    requests: &[(Transition, Option<Place>)],
     startup: &mut Vec<(Place, StartupCommand)>,
     notices: &mut Notices,
 ) -> Result<(), EniError> {
-    let Target::Register { ado, .. } = command.datagram.target else { return Ok(()) };
     let subject = named("InitCmd", &command.comment);
-    let mut note = |reason: &str| {
-        notices.add(Some(command.place), Some(index), subject.clone(), reason);
-        Ok(())
-    };
-    let access = match (command.datagram.command, &command.validate) {
-        (Command::Aprw | Command::Fprw | Command::Armw | Command::Frmw, _) => {
-            return note("a command that reads and writes at once is not sent");
+    match register_command(command) {
+        Ok(register) => {
+            startup.extend(planned(command, register, Some(index), &subject, notices));
+            note_order(index, command, requests, &subject, notices);
+            Ok(())
         }
-        (_, Some(validate)) if validate.data.is_empty() => return note("Validate has no data: not sent"),
-        (_, Some(validate)) => RegisterAccess::Check {
-            data: validate.data.clone(),
-            mask: validate.mask.clone(),
-            limit: Duration::from_millis(validate.timeout_ms.into()),
-        },
-        (command, None) if command.reads() => return note("a read whose answer is not compared is not sent"),
-        (_, None) if command.datagram.data.is_empty() => return note("a write without data is not sent"),
-        (_, None) => RegisterAccess::Write(command.datagram.data.clone()),
-    };
-    let end = usize::from(ado.0) + command.datagram.data.len();
-    if end > 0x1_0000 {
-        let what = subject.clone();
-        let got = format!("{} bytes at {ado}", command.datagram.data.len());
-        return Err(contradiction(eni, index, command.place, what, "an end within 64 KiB", got, ""));
+        Err(NotSent::Because(reason)) => {
+            notices.add(Some(command.place), Some(index), subject, reason);
+            Ok(())
+        }
+        Err(NotSent::BeyondMemory(got)) => {
+            Err(contradiction(eni, index, command.place, subject, "an end within 64 KiB", got, ""))
+        }
     }
-    let register = RegisterCommand::new(ado, access)
-        .with_retries(command.retries)
-        .with_required(command.datagram.count.is_some_and(|count| count > 0));
-    startup.extend(at_transitions(command.place, &command.transitions, index, &subject, notices, |transition| {
-        StartupCommand::new(transition, StartupAction::Register(register.clone()))
-            .with_comment(comment(&command.comment))
-    }));
-    Ok(())
+}
+
+/// Ways to INIT, with the last request of INIT that the file has at each.
+fn requests_of_init(commands: &[EcatCommand]) -> [(Transition, Option<Place>); 4] {
+    let mut last =
+        [Transition::Pi, Transition::Si, Transition::Oi, Transition::Bi].map(|transition| (transition, None));
+    for command in commands {
+        let is_request = matches!(command.datagram.target, Target::Register { ado, .. } if ado == map::AL_CONTROL);
+        if !is_request || !is_write(command.datagram.command) {
+            continue;
+        }
+        let named = last.iter_mut().filter(|(transition, _)| command.transitions.contains(transition));
+        named.for_each(|(_, place)| *place = (*place).max(Some(command.place)));
+    }
+    last
+}
+
+/// A command to a register on a way to INIT is sent in INIT, also if the file has it before the request of INIT.
+fn note_order(
+    index: usize,
+    command: &EcatCommand,
+    requests: &[(Transition, Option<Place>)],
+    subject: &str,
+    notices: &mut Notices,
+) {
+    let is_early = |(transition, place): &&(Transition, Option<Place>)| {
+        *place > Some(command.place) && command.transitions.contains(transition)
+    };
+    let names: Vec<&str> = requests.iter().filter(is_early).map(|(transition, _)| transition.name()).collect();
+    if !names.is_empty() {
+        let reason = format!("at {}: sent in INIT, in the file before the request of INIT", names.join(", "));
+        notices.add(Some(command.place), Some(index), subject, reason);
+    }
 }
 
 /// SyncManagers of process data that the file activates at SO are active in OP only: outputs that take effect in SAFEOP

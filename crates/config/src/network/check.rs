@@ -2,8 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use ringcat_engine::config::MailMessage;
+
 use super::error::{Fault, Step};
-use super::model::{Junctions, NetworkFile, Startup, SubDevice, SyncManager};
+use super::model::{At, Junctions, NetworkFile, Startup, SubDevice, SyncManager};
 
 /// Maximum number of SubDevices: positions have 16 bits, and the last one is reserved.
 const MAX_SUBDEVICES: usize = 65_534;
@@ -306,26 +308,31 @@ fn command(startup: &Startup) -> Checked {
         startup.sdo.is_some(),
         startup.upload.is_some(),
         startup.idn.is_some(),
+        startup.read_idn.is_some(),
         startup.ip.is_some(),
+        startup.aoe.is_some(),
+        startup.voe.is_some(),
         startup.write.is_some(),
         startup.check.is_some(),
     ];
     let count = given.iter().filter(|is_given| **is_given).count();
     if count != 1 {
-        return fault([], format!("expected one of sdo, upload, idn, ip, write and check, got {count} of them"));
+        let keys = "sdo, upload, idn, read_idn, ip, aoe, voe, write and check";
+        return fault([], format!("expected one of {keys}, got {count} of them"));
     }
-    let complete = [
-        ("sdo", startup.sdo.as_ref().map(|sdo| (sdo.complete, sdo.sub))),
-        ("upload", startup.upload.as_ref().map(|upload| (upload.complete, upload.sub))),
-    ];
-    for (key, sdo) in complete {
-        if let Some((true, sub @ 2..)) = sdo {
-            let message = format!("complete access begins at subindex 0 or 1, got {sub}");
-            return fault([key.into(), "sub".into()], message);
-        }
+    if startup.at == At::Ii && startup.write.is_none() && startup.check.is_none() {
+        return fault(["at".into()], "II is in INIT, which has no mailbox: expected write or check".to_owned());
     }
+    messages(startup)?;
+    complete(startup)?;
     if let Some(idn) = startup.idn.as_ref().filter(|idn| idn.drive > 7) {
         return fault(["idn".into(), "drive".into()], format!("expected 0 to 7, got {}", idn.drive));
+    }
+    if let Some(idn) = startup.read_idn.as_ref().filter(|idn| idn.drive > 7) {
+        return fault(["read_idn".into(), "drive".into()], format!("expected 0 to 7, got {}", idn.drive));
+    }
+    if startup.read_idn.as_ref().is_some_and(|idn| idn.elements == Some(0)) {
+        return fault(["read_idn".into(), "elements".into()], "expected at least one bit, got 0".to_owned());
     }
     if let Some(name) = startup.ip.as_ref().and_then(|ip| ip.name.as_ref()).filter(|name| name.len() > HOST_NAME) {
         let message = format!("expected at most {HOST_NAME} bytes, got {}", name.len());
@@ -348,6 +355,35 @@ fn command(startup: &Startup) -> Checked {
     {
         let message = format!("expected {} bytes as in data, got {}", check.data.0.len(), mask.0.len());
         return fault(["check".into(), "mask".into()], message);
+    }
+    Ok(())
+}
+
+/// Messages have the header of their protocol.
+fn messages(startup: &Startup) -> Checked {
+    let messages = [
+        ("aoe", startup.aoe.as_ref().map(|data| MailMessage::Aoe(data.0.clone())), "an AMS header with a request"),
+        ("voe", startup.voe.as_ref().map(|data| MailMessage::Voe(data.0.clone())), "vendor, type and data"),
+    ];
+    for (key, message, expected) in messages {
+        if message.is_some_and(|message| !message.is_sound()) {
+            return fault([key.into()], format!("expected {expected}"));
+        }
+    }
+    Ok(())
+}
+
+/// Complete access begins at the first or second entry.
+fn complete(startup: &Startup) -> Checked {
+    let complete = [
+        ("sdo", startup.sdo.as_ref().map(|sdo| (sdo.complete, sdo.sub))),
+        ("upload", startup.upload.as_ref().map(|upload| (upload.complete, upload.sub))),
+    ];
+    for (key, sdo) in complete {
+        if let Some((true, sub @ 2..)) = sdo {
+            let message = format!("complete access begins at subindex 0 or 1, got {sub}");
+            return fault([key.into(), "sub".into()], message);
+        }
     }
     Ok(())
 }

@@ -7,20 +7,18 @@ use std::collections::HashMap;
 use std::time::Duration;
 
 use ringcat_engine::config::{
-    ClockConfig, ConfigAddress, IdnWrite, IpSettings, Passage, PdoAssignment, PdoEntry, PdoMapping, ReferenceClock,
-    RegisterAccess, RegisterCommand, Repetition, SdoDownload, SdoUpload, StartupAction, StartupCommand,
-    SubDeviceConfig, SyncSignals, Timeouts, Transition, Watchdog, WhenUnlocked,
+    ClockConfig, ConfigAddress, Passage, PdoAssignment, PdoEntry, PdoMapping, ReferenceClock, Repetition,
+    SubDeviceConfig, SyncSignals, Timeouts, Watchdog, WhenUnlocked,
 };
 use ringcat_engine::declared::{GroupId, SubDeviceId};
 use ringcat_engine::info::Direction;
 use ringcat_engine::layout::LrwPolicy;
 use ringcat_engine::main_device::{Declaration, DomainConfig, DomainMember, Required};
 use ringcat_engine::{JunctionConnection, JunctionMode};
-use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::AlState;
-use ringcat_wire::mailbox::soe::Idn;
 
-use super::model::{self, At, CheckRevision, Junctions, Lrw, NetworkFile, Repeat, SubDevice, SyncManager, Target};
+use super::commands;
+use super::model::{self, CheckRevision, Junctions, Lrw, NetworkFile, Repeat, SubDevice, SyncManager, Target};
 use super::unique::Names;
 use super::values::{Shift, Time};
 use super::write::next_position;
@@ -303,7 +301,7 @@ fn fill(config: &mut SubDeviceConfig, of: &SubDevice) {
         Target::Safeop => AlState::SafeOp,
         Target::Op => AlState::Op,
     };
-    config.startup = of.startup.iter().filter_map(startup).collect();
+    config.startup = of.startup.iter().filter_map(commands::command).collect();
     let with_pdos = of.sync_manager.iter().filter(|it| !it.pdo.is_empty() || it.length.is_none());
     let assignments: Vec<PdoAssignment> = with_pdos.map(assignment).collect();
     config.pdos = (!assignments.is_empty()).then_some(assignments);
@@ -366,54 +364,4 @@ fn timeouts(of: &model::Timeouts) -> Timeouts {
         }
     }
     timeouts
-}
-
-fn startup(of: &model::Startup) -> Option<StartupCommand> {
-    let transition = match of.at {
-        At::Ip => Transition::Ip,
-        At::Ps => Transition::Ps,
-        At::So => Transition::So,
-        At::Os => Transition::Os,
-        At::Sp => Transition::Sp,
-    };
-    let command = StartupCommand::new(transition, action(of)?);
-    Some(command.with_limit(of.limit.map(|limit| limit.0)).with_comment(of.comment.clone()))
-}
-
-fn action(of: &model::Startup) -> Option<StartupAction> {
-    if let Some(sdo) = &of.sdo {
-        let download = SdoDownload::new(sdo.index, sdo.sub, sdo.data.0.clone());
-        return Some(StartupAction::Sdo(download.with_complete_access(sdo.complete)));
-    }
-    if let Some(upload) = &of.upload {
-        let expected = upload.data.as_ref().map(|data| data.0.clone());
-        let of = SdoUpload::new(upload.index, upload.sub).with_complete_access(upload.complete);
-        return Some(StartupAction::Upload(of.with_expected(expected)));
-    }
-    if let Some(idn) = &of.idn {
-        return Some(StartupAction::Idn(IdnWrite::new(idn.drive, Idn(idn.idn), idn.data.0.clone())));
-    }
-    if let Some(ip) = &of.ip {
-        let settings = IpSettings::default()
-            .with_mac(ip.mac.map(|mac| mac.0))
-            .with_address(ip.address)
-            .with_mask(ip.mask)
-            .with_gateway(ip.gateway)
-            .with_dns(ip.dns)
-            .with_name(ip.name.as_ref().map(|name| name.as_bytes().to_vec()));
-        return Some(StartupAction::Ip(settings));
-    }
-    if let Some(write) = &of.write {
-        let access = RegisterAccess::Write(write.data.0.clone());
-        let command = RegisterCommand::new(RegisterAddress(write.address), access);
-        return Some(StartupAction::Register(command.with_retries(write.retries).with_required(write.required)));
-    }
-    let check = of.check.as_ref()?;
-    let access = RegisterAccess::Check {
-        data: check.data.0.clone(),
-        mask: check.mask.as_ref().map(|mask| mask.0.clone()),
-        limit: check.within.map_or(Duration::ZERO, |within| within.0),
-    };
-    let command = RegisterCommand::new(RegisterAddress(check.address), access);
-    Some(StartupAction::Register(command.with_retries(check.retries).with_required(check.required)))
 }

@@ -4,6 +4,8 @@
 
 use std::time::Duration;
 
+use ringcat_engine::config::MailMessage;
+
 use super::check::check;
 use super::error::path_text;
 use super::model::{
@@ -331,8 +333,11 @@ fn startup(of: &SelectedCommand, from: &mut Notes) -> Option<Startup> {
                 return None;
             }
         },
+        SelectedMessage::Aoe(data) if MailMessage::Aoe(data.clone()).is_sound() => {
+            startup.aoe = Some(Bytes(data.clone()));
+        }
         SelectedMessage::Aoe(_) => {
-            from.note(format!("InitCmd \"{}\" of AoE: not sent", of.comment));
+            from.note(format!("InitCmd \"{}\" of AoE: no AMS header with a request, not sent", of.comment));
             return None;
         }
     }

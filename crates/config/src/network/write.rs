@@ -387,15 +387,27 @@ fn timeouts(out: &mut Text, of: &Timeouts) {
     }
 }
 
-fn startup(out: &mut Text, of: &Startup) {
-    out.table("[[subdevice.startup]]");
-    out.word("at", of.at, At::default(), |at| match at {
+const fn transition(at: At) -> &'static str {
+    match at {
         At::Ip => "IP",
         At::Ps => "PS",
         At::So => "SO",
         At::Os => "OS",
         At::Sp => "SP",
-    });
+        At::Ii => "II",
+        At::Pp => "PP",
+        At::Ss => "SS",
+        At::Pi => "PI",
+        At::Si => "SI",
+        At::Oi => "OI",
+        At::Ib => "IB",
+        At::Bi => "BI",
+    }
+}
+
+fn startup(out: &mut Text, of: &Startup) {
+    out.table("[[subdevice.startup]]");
+    out.word("at", of.at, At::default(), transition);
     let bytes = |bytes: &Bytes| format!("\"{bytes}\"");
     let mut inline = |key: &str, pairs: Vec<Option<String>>| {
         let pairs: Vec<String> = pairs.into_iter().flatten().collect();
@@ -419,6 +431,12 @@ fn startup(out: &mut Text, of: &Startup) {
         let (number, data) = (pair("idn", hex_4(idn.idn).to_string()), pair("data", bytes(&idn.data)));
         inline("idn", vec![small("drive", idn.drive), number, data]);
     }
+    if let Some(read) = &of.read_idn {
+        let (number, data) = (pair("idn", hex_4(read.idn).to_string()), read.data.as_ref());
+        let elements = read.elements.and_then(|elements| pair("elements", format!("{elements:#04x}")));
+        let data = data.and_then(|data| pair("data", bytes(data)));
+        inline("read_idn", vec![small("drive", read.drive), number, elements, data]);
+    }
     if let Some(ip) = &of.ip {
         let address = |key: &str, value: Option<std::net::Ipv4Addr>| value.map(|value| format!("{key} = \"{value}\""));
         let mac = ip.mac.map(|mac| format!("mac = \"{mac}\""));
@@ -438,6 +456,8 @@ fn startup(out: &mut Text, of: &Startup) {
         let (retries, required) = (large("retries", check.retries), flag("required", check.required));
         inline("check", vec![address, data, mask, within, retries, required]);
     }
+    out.some("aoe", of.aoe.as_ref().map(bytes));
+    out.some("voe", of.voe.as_ref().map(bytes));
     out.time("limit", of.limit);
     out.name("comment", &of.comment);
 }

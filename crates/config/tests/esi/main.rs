@@ -2,6 +2,7 @@
 //! files if they are beside the repository.
 
 mod bad_files;
+mod differences;
 mod editions;
 mod images;
 mod reading;

@@ -146,3 +146,33 @@ fn a_changed_number_gives_the_same_declaration_again_or_a_refusal() {
     }
     assert!(same > 100 && refused < same / 4, "{same} are the same, {refused} are refused");
 }
+
+/// Commands at all transitions, of all protocols.
+// covers: 8.2, eni-run
+#[test]
+fn commands_at_all_transitions_and_messages_keep_their_place_when_exported() {
+    let names = ["IP", "PP", "PS", "SS", "SO", "OS", "SP", "PI", "SI", "OI", "IB", "BI"];
+    let all: String = names.iter().map(|name| format!("<Transition>{name}</Transition>")).collect();
+    let ams = "050607080301e803050607080301008004000400000000000000000034120000";
+    let register = format!(
+        "<InitCmd><Transition>II</Transition>{all}<Comment>own</Comment><Cmd>5</Cmd><Adp>1004</Adp><Ado>3968</Ado>\
+         <Data>01</Data></InitCmd>"
+    );
+    let message = |protocol: &str, data: &str| {
+        let command = format!("<InitCmd>{all}<Timeout>5</Timeout><Data>{data}</Data></InitCmd>");
+        format!("<{protocol}><InitCmds>{command}</InitCmds></{protocol}>")
+    };
+    let read = format!("<InitCmd>{all}<OpCode>2</OpCode><IDN>9</IDN><Elements>72</Elements></InitCmd>");
+    let (head, rest) = SMALL.split_at(SMALL.find("<SoE><InitCmds>").expect("it is there"));
+    let soe = rest.replacen("<SoE><InitCmds>", &format!("<SoE><InitCmds>{read}"), 1);
+    let messages = message("AoE", ams) + &message("VoE", "470c00000700aa");
+    let text = head.to_owned() + &soe.replacen("<AoE><NetId>5.6.7.8.3.1</NetId></AoE>", &messages, 1);
+    let at = "<InitCmd><Transition>PS</Transition><Comment>set sm 2 and 3</Comment>";
+    let text = text.replacen(at, &format!("{register}{at}"), 1);
+    let expected = configured(&text);
+    let export = again(&text, &ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    assert_same("all", &expected, &export.configuration);
+    let count = export.configuration.declaration.subdevices[3].startup.len();
+    assert_eq!(count, expected.declaration.subdevices[3].startup.len());
+    assert!(count > 13 + 3 * 12, "{count}");
+}

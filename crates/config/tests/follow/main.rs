@@ -3,6 +3,7 @@
 mod commands;
 mod contradictions;
 mod images;
+mod other_commands;
 mod reading;
 mod real_files;
 mod segments;

@@ -73,11 +73,19 @@ fn a_group_may_be_identified_by_its_eeprom_or_its_switch() {
     assert_eq!(addresses(&configuration)[1], ConfigAddress::Alias { alias: 7, offset: 0 });
     let switch = changed(&[(HEAD, &GROUP.replace("<Ado>18</Ado>", "<Ado>308</Ado>"))]);
     assert_eq!(addresses(&switch)[2], ConfigAddress::Identification { value: 0x1234, offset: 1 });
+    // A data word: digital inputs, process RAM.
+    for word in ["<Ado>3864</Ado>", "<Ado>4096</Ado>"] {
+        let word = GROUP.replace("<Ado>18</Ado>", word);
+        let expected = ConfigAddress::Identification { value: 0x1234, offset: 0 };
+        assert_eq!(addresses(&changed(&[(HEAD, &word)]))[1], expected);
+        let masked = word.replace("<Data>3412</Data>", "<Data>3402</Data><DataMask>ff0f</DataMask>");
+        assert!(refused(&[(HEAD, &masked)]).contains("a whole data word"), "a part of a word is none");
+    }
 }
 
 #[test]
 fn a_group_that_cannot_be_found_or_is_not_complete_is_refused() {
-    let word = refused(&[(HEAD, &GROUP.replace("<Ado>18</Ado>", "<Ado>4096</Ado>"))]);
+    let word = refused(&[(HEAD, &GROUP.replace("<Ado>18</Ado>", "<Ado>3584</Ado>"))]);
     assert!(word.contains("identification of the hot connect group \"Gripper\""), "{word}");
     assert!(word.contains("other kinds of identification"), "{word}");
     let long = refused(&[(HEAD, &GROUP.replace(">2</GroupMemberCnt>", ">9</GroupMemberCnt>"))]);

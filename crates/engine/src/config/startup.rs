@@ -1,5 +1,5 @@
-//! Start-up commands: objects, IDNs, IP parameters and registers that are written at each pass of a transition
-//! (protocol 5.1, 6.3, 6.5, 6.6).
+//! Start-up commands: objects, IDNs, IP parameters, messages and registers that are written or read at each pass of a
+//! transition (protocol 5.1, 6.3, 6.5 to 6.8).
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -7,14 +7,22 @@ use core::fmt;
 use core::time::Duration;
 
 use ringcat_wire::al::AlState;
-use ringcat_wire::mailbox::soe::Idn;
+use ringcat_wire::mailbox::aoe::AmsHeader;
+use ringcat_wire::mailbox::soe::{Idn, SoeElements};
+use ringcat_wire::mailbox::voe::VoeMessage;
 
 use super::ip::IpSettings;
 use super::register::RegisterCommand;
 
-/// A transition at which start-up commands are sent, before the new state is requested. INIT has no mailbox: of the
-/// commands of IP, register commands are sent in INIT before the mailbox is set up, all others as soon as PREOP is
-/// reached.
+/// A transition at which start-up commands are sent, before the new state is requested.
+///
+/// INIT has no mailbox. At a transition between INIT and another state, register commands are sent in INIT, all others
+/// in the other state: at IP first the registers, then PREOP, then the mail; at PI first the mail, then INIT, then the
+/// registers.
+///
+/// Commands of a way to INIT ([`Transition::Pi`], [`Transition::Si`], [`Transition::Oi`], [`Transition::Bi`]) are sent
+/// if the application requests a state that is reached through INIT, and the SubDevice is as configured. The recovery
+/// of a SubDevice sends none, nor do a stop and a deactivation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Transition {
     /// INIT to PREOP.
@@ -27,25 +35,83 @@ pub enum Transition {
     Os,
     /// SAFEOP to PREOP; a change from OP to PREOP passes SAFEOP.
     Sp,
+    /// INIT to INIT: at the beginning of each bring-up that does not begin with a way to INIT, and if INIT is requested
+    /// again. Only register commands are possible.
+    Ii,
+    /// PREOP to PREOP: PREOP is requested again.
+    Pp,
+    /// SAFEOP to SAFEOP: SAFEOP is requested again.
+    Ss,
+    /// PREOP to INIT, also on the way to BOOT.
+    Pi,
+    /// SAFEOP to INIT, also on the way to BOOT.
+    Si,
+    /// OP to INIT, also on the way to BOOT.
+    Oi,
+    /// INIT to BOOT.
+    Ib,
+    /// BOOT to INIT.
+    Bi,
 }
 
 impl Transition {
+    /// All transitions, each one behind those that usually precede it.
+    pub const ALL: [Transition; 13] = [
+        Transition::Ii,
+        Transition::Ip,
+        Transition::Pp,
+        Transition::Ps,
+        Transition::Ss,
+        Transition::So,
+        Transition::Os,
+        Transition::Sp,
+        Transition::Pi,
+        Transition::Si,
+        Transition::Oi,
+        Transition::Ib,
+        Transition::Bi,
+    ];
+
+    /// The transition from a state to itself.
+    pub(crate) const fn within(state: AlState) -> Option<Transition> {
+        match state {
+            AlState::Init => Some(Transition::Ii),
+            AlState::PreOp => Some(Transition::Pp),
+            AlState::SafeOp => Some(Transition::Ss),
+            AlState::Op | AlState::Boot => None,
+        }
+    }
+
+    /// The transition from a state to INIT.
+    pub(crate) const fn to_init(state: AlState) -> Transition {
+        match state {
+            AlState::Init => Transition::Ii,
+            AlState::PreOp => Transition::Pi,
+            AlState::SafeOp => Transition::Si,
+            AlState::Op => Transition::Oi,
+            AlState::Boot => Transition::Bi,
+        }
+    }
+
     /// The state before it.
     pub const fn from(self) -> AlState {
         match self {
-            Transition::Ip => AlState::Init,
-            Transition::Ps => AlState::PreOp,
-            Transition::So | Transition::Sp => AlState::SafeOp,
-            Transition::Os => AlState::Op,
+            Transition::Ii | Transition::Ip | Transition::Ib => AlState::Init,
+            Transition::Ps | Transition::Pp | Transition::Pi => AlState::PreOp,
+            Transition::So | Transition::Sp | Transition::Ss | Transition::Si => AlState::SafeOp,
+            Transition::Os | Transition::Oi => AlState::Op,
+            Transition::Bi => AlState::Boot,
         }
     }
 
     /// The state after it.
     pub const fn to(self) -> AlState {
         match self {
-            Transition::Ip | Transition::Sp => AlState::PreOp,
-            Transition::Ps | Transition::Os => AlState::SafeOp,
+            Transition::Ii | Transition::Pi | Transition::Si | Transition::Oi | Transition::Bi => AlState::Init,
+            Transition::Ip | Transition::Sp | Transition::Pp => AlState::PreOp,
+            Transition::Ps | Transition::Os | Transition::Ss => AlState::SafeOp,
             Transition::So => AlState::Op,
+            Transition::Ib => AlState::Boot,
         }
     }
 }
@@ -139,6 +205,61 @@ impl IdnWrite {
     }
 }
 
+/// A read of elements of an IDN.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub struct IdnRead {
+    /// Drive of the SubDevice, 0..=7.
+    pub drive: u8,
+    /// The IDN.
+    pub idn: Idn,
+    /// The elements; several are read in the order of their bits.
+    pub elements: SoeElements,
+    /// Required data, little-endian; with other data the configuration fails. With `None` an event reports the data.
+    pub expected: Option<Vec<u8>>,
+}
+
+impl IdnRead {
+    /// A read of the value of an IDN; any value is accepted.
+    pub const fn new(drive: u8, idn: Idn) -> IdnRead {
+        IdnRead { drive, idn, elements: SoeElements::VALUE, expected: None }
+    }
+
+    /// Sets [`IdnRead::elements`].
+    #[must_use]
+    pub const fn with_elements(mut self, elements: SoeElements) -> IdnRead {
+        self.elements = elements;
+        self
+    }
+
+    /// Sets [`IdnRead::expected`].
+    #[must_use]
+    pub fn with_expected(mut self, expected: impl Into<Option<Vec<u8>>>) -> IdnRead {
+        self.expected = expected.into();
+        self
+    }
+}
+
+/// A whole message behind the mailbox header, as its author wrote it.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum MailMessage {
+    /// AoE: an AMS header with a request. Its answer has to report no error.
+    Aoe(Vec<u8>),
+    /// VoE: vendor, type and data. The SubDevice has to take it; an answer is mail for the application.
+    Voe(Vec<u8>),
+}
+
+impl MailMessage {
+    /// Whether it begins with the header of its protocol.
+    pub fn is_sound(&self) -> bool {
+        match self {
+            MailMessage::Aoe(data) => AmsHeader::decode(data).is_ok_and(|(header, _)| !header.is_response()),
+            MailMessage::Voe(data) => VoeMessage::decode(data).is_ok(),
+        }
+    }
+}
+
 /// Action of a start-up command.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
@@ -153,6 +274,10 @@ pub enum StartupAction {
     Ip(IpSettings),
     /// A register of its controller.
     Register(RegisterCommand),
+    /// SoE read.
+    IdnRead(IdnRead),
+    /// A message of AoE or VoE.
+    Mail(MailMessage),
 }
 
 /// A start-up command.

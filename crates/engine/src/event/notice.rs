@@ -8,6 +8,7 @@ use ringcat_wire::address::{LogicalAddress, Position, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::mailbox::Protocol;
 use ringcat_wire::mailbox::coe::Emergency;
+use ringcat_wire::mailbox::soe::Idn;
 
 use crate::declared::{Address, SubDeviceId};
 use crate::domain::DomainId;
@@ -74,6 +75,21 @@ pub(crate) enum Notice {
         /// The value.
         data: Vec<u8>,
     },
+    /// A start-up command has read an IDN for the application.
+    StartupIdn {
+        /// Index in the declaration.
+        subdevice: SubDeviceId,
+        /// Number of the command.
+        number: usize,
+        /// Drive of the SubDevice.
+        drive: u8,
+        /// The IDN.
+        idn: Idn,
+        /// Purpose of the command.
+        comment: Option<String>,
+        /// The data.
+        data: Vec<u8>,
+    },
     /// A mail of a SubDevice to the application.
     Emergency {
         /// The SubDevice.
@@ -113,6 +129,9 @@ impl From<Notice> for Event {
             Notice::CannotDisconnect { link } => Event::CannotDisconnect { link },
             Notice::StartupRead { subdevice, number, index, sub_index, comment, data } => {
                 Event::StartupRead { subdevice, number, index, sub_index, comment, data }
+            }
+            Notice::StartupIdn { subdevice, number, drive, idn, comment, data } => {
+                Event::StartupIdn { subdevice, number, drive, idn, comment, data }
             }
             Notice::Emergency { subdevice, emergency } => Event::Emergency { subdevice, emergency },
             Notice::CyclicCommand { domain, command, logical, length, expected, got, cycles, subdevices } => {

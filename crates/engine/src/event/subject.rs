@@ -120,9 +120,9 @@ impl Event {
             | Event::Returned { .. }
             | Event::ConfigurationFailed { .. }
             | Event::PlanOddity { .. }
-            | Event::StartupRead { .. }
             | Event::GroupJoined { .. }
             | Event::GroupLeft { .. } => Subject::States,
+            Event::StartupRead { .. } | Event::StartupIdn { .. } => Subject::States,
             Event::ConversationCut { .. } | Event::Emergency { .. } => Subject::Mail,
             Event::Domain { .. } | Event::Skipped { .. } => Subject::Domains,
             Event::CyclicCommand { .. } | Event::AcyclicCommand { .. } => Subject::Commands,

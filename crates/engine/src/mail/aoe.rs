@@ -200,6 +200,18 @@ async fn request<T>(
     conversation.request(&payload[..AmsHeader::LEN + length], limits, accept).await?
 }
 
+/// Sends a whole request, an AMS header with its data, and waits for the response with its invoke id.
+pub(crate) async fn send(mailbox: &Mailbox, message: &[u8], limits: Limits) -> Result<(), AoeError> {
+    let (header, _) = AmsHeader::decode(message).map_err(AoeError::Malformed)?;
+    let mut conversation = mailbox.conversation(Lane::Aoe).await?;
+    let (bytes, limit) = (message.len(), conversation.request_capacity());
+    if bytes > limit {
+        return Err(MailboxError::TooLong { bytes, limit }.into());
+    }
+    let accept = |payload: &[u8]| answer(payload, header.command, header.invoke_id, |_| Some(()));
+    conversation.request(message, limits, accept).await?
+}
+
 fn answer<T>(
     payload: &[u8],
     command: AdsCommand,

@@ -34,6 +34,16 @@ pub async fn send(mailbox: &Mailbox, message: &Voe, limit: Duration) -> Result<(
     conversation.send(&payload, limit).await
 }
 
+/// Sends a whole message, with its header, and waits until the SubDevice has accepted it.
+pub(crate) async fn send_whole(mailbox: &Mailbox, message: &[u8], limit: Duration) -> Result<(), MailboxError> {
+    let mut conversation = mailbox.conversation(Lane::Voe).await?;
+    let (bytes, capacity) = (message.len(), conversation.request_capacity());
+    if bytes > capacity {
+        return Err(MailboxError::TooLong { bytes, limit: capacity });
+    }
+    conversation.send(message, limit).await
+}
+
 /// Sends a message and waits for the next message of the same vendor.
 pub async fn exchange(mailbox: &Mailbox, message: &Voe, limits: Limits) -> Result<Voe, MailboxError> {
     let mut conversation = mailbox.conversation(Lane::Voe).await?;

@@ -31,6 +31,9 @@ impl MainDevice {
     /// it when it comes. If it refuses, it is brought back to the previous state. Without process data its working
     /// counters are not expected, and its inputs are not fresh.
     ///
+    /// A state in which it is already changes nothing; start-up commands of a transition from a state to itself are
+    /// sent then.
+    ///
     /// One without a declaration goes through INIT: to PREOP or BOOT, where its mailbox can be used, to INIT, or to
     /// SAFEOP or OP with the defaults of its SII and without process data. With idle operation it is kept there.
     pub fn start_state_request(

@@ -8,7 +8,9 @@ use ringcat_wire::register::{SyncManager, SyncManagerDirection};
 use super::areas::{PROCESS_RAM, occupied};
 use super::error::PlanProblem;
 use super::subdevice::{AreaPlan, SmPlan};
-use crate::config::{IdnWrite, SdoDownload, SdoUpload, StartupAction, SubDeviceConfig};
+use crate::config::{
+    IdnRead, IdnWrite, MailMessage, SdoDownload, SdoUpload, StartupAction, StartupCommand, SubDeviceConfig, Transition,
+};
 use crate::info::SubDeviceInfo;
 use crate::order::InOrder;
 
@@ -51,6 +53,8 @@ pub(super) struct SupportedProtocols {
     coe: bool,
     soe: bool,
     eoe: bool,
+    aoe: bool,
+    voe: bool,
 }
 
 impl SupportedProtocols {
@@ -62,13 +66,19 @@ impl SupportedProtocols {
             coe: mailbox && (declared || protocols.coe()),
             soe: mailbox && (declared || protocols.soe()),
             eoe: mailbox && (declared || protocols.eoe()),
+            aoe: mailbox && (declared || protocols.aoe()),
+            voe: mailbox && (declared || protocols.voe()),
         }
     }
 }
 
 /// Whether a SubDevice supports a start-up command.
-pub(super) fn command(supported: SupportedProtocols, action: &StartupAction) -> Result<(), PlanProblem> {
-    match action {
+pub(super) fn command(supported: SupportedProtocols, command: &StartupCommand) -> Result<(), PlanProblem> {
+    let is_register = matches!(command.action, StartupAction::Register(_));
+    if command.transition == Transition::Ii && !is_register {
+        return Err(PlanProblem::NoMailInInit);
+    }
+    match &command.action {
         StartupAction::Sdo(SdoDownload { index, sub_index, .. })
         | StartupAction::Upload(SdoUpload { index, sub_index, .. })
             if !supported.coe =>
@@ -78,7 +88,13 @@ pub(super) fn command(supported: SupportedProtocols, action: &StartupAction) -> 
         StartupAction::Idn(IdnWrite { drive, idn, .. }) if !supported.soe => {
             Err(PlanProblem::NoSoe { drive: *drive, idn: *idn })
         }
+        StartupAction::IdnRead(IdnRead { drive, idn, .. }) if !supported.soe => {
+            Err(PlanProblem::NoSoe { drive: *drive, idn: *idn })
+        }
         StartupAction::Ip(_) if !supported.eoe => Err(PlanProblem::NoEoe),
+        StartupAction::Mail(MailMessage::Aoe(_)) if !supported.aoe => Err(PlanProblem::NoProtocol("AoE")),
+        StartupAction::Mail(MailMessage::Voe(_)) if !supported.voe => Err(PlanProblem::NoProtocol("VoE")),
+        StartupAction::Mail(message) if !message.is_sound() => Err(PlanProblem::Message),
         StartupAction::Register(command) if !command.is_sound() => {
             let (data, mask) = command.lengths();
             Err(PlanProblem::RegisterCommand { register: command.address, data, mask })
@@ -86,6 +102,8 @@ pub(super) fn command(supported: SupportedProtocols, action: &StartupAction) -> 
         StartupAction::Sdo(_)
         | StartupAction::Upload(_)
         | StartupAction::Idn(_)
+        | StartupAction::IdnRead(_)
+        | StartupAction::Mail(_)
         | StartupAction::Ip(_)
         | StartupAction::Register(_) => Ok(()),
     }

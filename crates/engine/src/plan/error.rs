@@ -171,6 +171,12 @@ pub enum PlanProblem {
     },
     /// IP parameters for a SubDevice without EoE.
     NoEoe,
+    /// A message for a SubDevice without its protocol.
+    NoProtocol(&'static str),
+    /// A message without the header of its protocol, or an answer.
+    Message,
+    /// A mailbox command at the transition from INIT to INIT.
+    NoMailInInit,
     /// A configuration file declares a SyncManager twice.
     DeclaredTwice {
         /// Its number.
@@ -288,6 +294,7 @@ impl fmt::Display for PlanProblem {
                 write!(f, "{expected} FMMUs are needed, the controller has {got}")
             }
             Self::NoCoe { .. } | Self::NoSoe { .. } | Self::NoEoe => self.fmt_protocol(f),
+            Self::NoProtocol(_) | Self::Message | Self::NoMailInInit => self.fmt_protocol(f),
             Self::DeclaredTwice { sync_manager } => write!(f, "SM {sync_manager} is declared twice"),
             Self::DeclaredMailboxes { out, inward } => {
                 write!(f, "expected a mailbox to the SubDevice and one from it, or none, got {out} and {inward}")
@@ -327,7 +334,14 @@ impl PlanProblem {
                 write!(f, "object {index:#06x}:{sub_index:02x} is to be written, but the SubDevice has no CoE")
             }
             Self::NoSoe { drive, idn } => {
-                write!(f, "{idn} of drive {drive} is to be written, but the SubDevice has no SoE")
+                write!(f, "{idn} of drive {drive} is to be accessed, but the SubDevice has no SoE")
+            }
+            Self::Message => {
+                f.write_str("a message of a start-up command has no header of its protocol, or is an answer")
+            }
+            Self::NoMailInInit => f.write_str("a mailbox command is declared from INIT to INIT: INIT has no mailbox"),
+            Self::NoProtocol(protocol) => {
+                write!(f, "a message of {protocol} is to be sent, but the SubDevice has no {protocol}")
             }
             _ => f.write_str("IP parameters are to be set, but the SubDevice has no EoE"),
         }

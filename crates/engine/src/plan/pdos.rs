@@ -49,7 +49,12 @@ fn wanted(pdo: &MappedPdo) -> PdoMapping {
 fn writes_pdos(config: &SubDeviceConfig) -> bool {
     config.startup.iter().any(|command| match &command.action {
         StartupAction::Sdo(download) => is_of_pdos(download.index),
-        StartupAction::Upload(_) | StartupAction::Idn(_) | StartupAction::Ip(_) | StartupAction::Register(_) => false,
+        StartupAction::Upload(_)
+        | StartupAction::Idn(_)
+        | StartupAction::IdnRead(_)
+        | StartupAction::Mail(_)
+        | StartupAction::Ip(_)
+        | StartupAction::Register(_) => false,
     })
 }
 

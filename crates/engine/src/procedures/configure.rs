@@ -58,12 +58,23 @@ impl BringUp<'_> {
     /// The full bring-up. The working counter expects the SubDevice from SAFEOP on.
     pub(super) async fn run(&self, start: Start) -> Result<(), ConfigureError> {
         self.bus.step(Subject::States, || format!("{}: configuration begins, target {}", self.station, self.target));
-        self.process_data(ProcessDataStep::Off);
-        self.set_configured(false);
-        self.mailbox.close();
+        self.take_out();
         if start != Start::Cleared {
             self.back_to_init().await?;
         }
+        self.command_registers(Transition::Ii).await?;
+        self.up_from_init().await
+    }
+
+    /// Its process data, its configuration and its mailbox are not used any more.
+    fn take_out(&self) {
+        self.process_data(ProcessDataStep::Off);
+        self.set_configured(false);
+        self.mailbox.close();
+    }
+
+    /// From INIT with cleared registers to the target state.
+    async fn up_from_init(&self) -> Result<(), ConfigureError> {
         match self.target {
             AlState::Init => Ok(()),
             AlState::Boot => self.boot().await,
@@ -101,9 +112,13 @@ impl BringUp<'_> {
             al_state::acknowledge(self.bus, self.station, self.setup.emulated).await?;
         }
         self.request(status.al_state().unwrap_or(AlState::Op), AlState::Init).await?;
+        Ok(self.clear_sync_managers().await?)
+    }
+
+    /// Start address and length of an enabled SyncManager are kept: it is only disabled.
+    pub(super) async fn clear_sync_managers(&self) -> Result<(), BusError> {
         let sync_managers = vec![0; SyncManager::LEN * usize::from(self.setup.sync_manager_count)];
-        self.bus.fpwr(self.station, map::SYNC_MANAGER_BASE, &sync_managers).await?;
-        Ok(())
+        self.bus.fpwr(self.station, map::SYNC_MANAGER_BASE, &sync_managers).await
     }
 
     async fn write_sync_manager(&self, index: u8, register: &SyncManager) -> Result<(), BusError> {
@@ -131,11 +146,13 @@ impl BringUp<'_> {
         self.command_mail(Transition::Ip).await
     }
 
-    /// Mailboxes of the boot loader, EEPROM to the PDI (the boot loader keeps it), BOOT.
+    /// Register commands of IB, mailboxes of the boot loader, EEPROM to the PDI (the boot loader keeps it), BOOT, other
+    /// commands of IB.
     async fn boot(&self) -> Result<(), ConfigureError> {
         let (Some(layout), [_, send]) = (self.setup.plan.bootstrap_layout(), &self.setup.plan.bootstrap[..]) else {
             return Err(ConfigureError::NoBoot);
         };
+        self.command_registers(Transition::Ib).await?;
         for sync_manager in &self.setup.plan.bootstrap {
             self.write_sync_manager(sync_manager.index, &sync_manager.register).await?;
         }
@@ -143,7 +160,7 @@ impl BringUp<'_> {
         self.request(AlState::Init, AlState::Boot).await?;
         self.show_mail(send.index).await?;
         self.mailbox.open(self.station, layout, send.index);
-        Ok(())
+        self.command_mail(Transition::Ib).await
     }
 
     /// Maps the mailbox-full bit of a SyncManager; the other FMMUs follow on the way to SAFEOP.

@@ -11,7 +11,7 @@ use super::junction::isolate_rings;
 use super::mail_watch::watch_mail;
 use super::presence::prove_inputs;
 use super::recover::bring_up_member;
-use super::request_state::change_state;
+use super::request_state::{change_state, repeat_state};
 use super::scan::ScanOptions;
 use super::serve_requests::{Requests, serve_requests};
 use super::services::statistics::collect;
@@ -50,6 +50,7 @@ pub(crate) async fn reconcile(bus: Bus, segment: SharedSegment, companions: Comp
             Task::ChangeState { index, attempt, before } => {
                 bus.spawn(change_state(own_bus, own, (index, attempt), before));
             }
+            Task::RepeatState { index, attempt } => bus.spawn(repeat_state(own_bus, own, (index, attempt))),
             Task::ProveInputs { index, mapping } => bus.spawn(prove_inputs(own_bus, own, index, mapping)),
             Task::ReadUnassigned { key } => bus.spawn(read_unassigned(own_bus, own, key)),
             Task::BringUndeclared { key, attempt } => bus.spawn(bring_undeclared(own_bus, own, (key, attempt))),

@@ -21,6 +21,7 @@ use super::sii;
 use super::unassigned::{Mark, has_identity, mark, take_away};
 use crate::event::Subject;
 use crate::mail::MailboxError;
+use crate::mail::aoe::AoeError;
 use crate::mail::coe::SdoFailure;
 use crate::mail::eoe::EoeFailure;
 use crate::mail::soe::SoeFailure;
@@ -113,7 +114,14 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
         ConfigureError::Startup { error: StartupError::Register(error), .. } => {
             matches!(error.cause, RegisterFailure::Bus(_))
         }
-        ConfigureError::Startup { error: StartupError::Value { .. }, .. }
+        ConfigureError::Startup {
+            error: StartupError::Aoe(AoeError::Mailbox(error)) | StartupError::Voe(error),
+            ..
+        } => matches!(error, MailboxError::Bus(_) | MailboxError::Closed),
+        ConfigureError::Startup {
+            error: StartupError::Value { .. } | StartupError::IdnValue { .. } | StartupError::Aoe(_),
+            ..
+        }
         | ConfigureError::State(_)
         | ConfigureError::NotLocked(_)
         | ConfigureError::NotPermitted(_)

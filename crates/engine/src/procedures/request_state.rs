@@ -10,7 +10,7 @@ use core::pin::pin;
 
 use ringcat_wire::al::AlState;
 
-use super::configure::{BringUp, ConfigureError};
+use super::configure::ConfigureError;
 use super::read_again::read_again;
 use super::recover::{bring_up, is_of_bus, keep_up, no_setup, problem, while_current};
 use super::shared_segment::SharedSegment;
@@ -64,9 +64,21 @@ fn begin(segment: &SharedSegment, index: usize, state: AlState) -> Option<Result
     segment.observe(Observation::Requested { subdevice: Addressed::Member(index), state });
     match phase? {
         Phase::Absent => Some(Err(ConfigureError::Absent)),
-        Phase::Settled(is) if is == state => Some(Ok(())),
+        Phase::Settled(is) if is == state && !segment.view().member(index)?.has_commands_within(state) => Some(Ok(())),
         Phase::Settled(_) | Phase::Configuring => None,
     }
+}
+
+/// Sends the commands of a member whose state is requested again.
+pub(super) async fn repeat_state(bus: Bus, segment: SharedSegment, (index, attempt): (usize, u32)) {
+    let procedure = pin!(async {
+        let stayed = match bring_up(&bus, &segment, (index, attempt)) {
+            Ok(bring_up) => bring_up.stay().await.map(|()| bring_up.target),
+            Err(error) => Err(error),
+        };
+        finish(&bus, &segment, (index, attempt), None, stayed).await;
+    });
+    while_current(&segment, index, attempt, procedure).await;
 }
 
 /// Changes a member to its new target state while the attempt is the current one; after a refusal back to the state
@@ -77,7 +89,20 @@ pub(super) async fn change_state(bus: Bus, segment: SharedSegment, (index, attem
 }
 
 async fn go(bus: &Bus, segment: &SharedSegment, (index, attempt): (usize, u32), before: AlState) {
-    match travel(bus, segment, (index, attempt), before).await {
+    let travelled = travel(bus, segment, (index, attempt), before).await;
+    finish(bus, segment, (index, attempt), Some(before), travelled).await;
+}
+
+/// The result for the application, and for the model. A SubDevice that has refused is brought back to its target state
+/// `before`, if that was another one.
+async fn finish(
+    bus: &Bus,
+    segment: &SharedSegment,
+    (index, attempt): (usize, u32),
+    before: Option<AlState>,
+    result: Result<AlState, ConfigureError>,
+) {
+    match result {
         Ok(state) => {
             segment.results.end(index, attempt, Ok(()));
             segment.observe_member((index, attempt), MemberFinding::Reached(state));
@@ -88,7 +113,7 @@ async fn go(bus: &Bus, segment: &SharedSegment, (index, attempt): (usize, u32), 
             let failed = MemberFinding::Failed(problem(&error));
             segment.results.end(index, attempt, Err(error));
             segment.observe_member((index, attempt), failed);
-            if has_refused {
+            if let Some(before) = before.filter(|_| has_refused) {
                 segment.observe_member((index, attempt), MemberFinding::Refused(before));
             }
             keep_up(bus, segment, (index, attempt), Start::Unknown, None).await;
@@ -103,9 +128,10 @@ async fn travel(
     before: AlState,
 ) -> Result<AlState, ConfigureError> {
     if before == AlState::Boot {
-        let to_init = BringUp { target: AlState::Init, ..bring_up(bus, segment, member)? };
-        to_init.run(Start::Unknown).await?;
+        bring_up(bus, segment, member)?.leave_boot().await?;
         read_again(bus, segment, member).await;
+        let bring_up = bring_up(bus, segment, member)?;
+        return bring_up.up_from_boot().await.map(|()| bring_up.target);
     }
     let bring_up = bring_up(bus, segment, member)?;
     bring_up.travel().await.map(|()| bring_up.target)

@@ -110,6 +110,13 @@ pub enum Task {
         /// Its target state before.
         before: AlState,
     },
+    /// Sends the commands of a member whose state the application requests again.
+    RepeatState {
+        /// The member.
+        index: usize,
+        /// Number of the attempt.
+        attempt: u32,
+    },
     /// Reads a member's inputs until all have been delivered.
     ProveInputs {
         /// The member.

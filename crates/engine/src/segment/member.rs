@@ -9,7 +9,7 @@ use ringcat_wire::al::AlState;
 
 use super::repair::Repair;
 use super::setup::{Setup, SetupError};
-use crate::config::SubDeviceConfig;
+use crate::config::{SubDeviceConfig, Transition};
 use crate::info::SubDeviceInfo;
 use crate::time::Instant;
 
@@ -110,6 +110,12 @@ impl Member {
         self.setup.is_some() || self.unfit.is_some()
     }
 
+    /// Whether commands are declared for another request of a state in which it is.
+    pub fn has_commands_within(&self, state: AlState) -> bool {
+        let transition = Transition::within(state);
+        self.config.startup.iter().any(|command| Some(command.transition) == transition)
+    }
+
     /// Whether it is in its declared state.
     pub fn is_as_declared(&self) -> bool {
         self.phase == Phase::Settled(self.config.target)
@@ -129,6 +135,12 @@ impl Member {
     /// Begins another attempt to configure it; the previous attempt ends. Returns the number.
     pub(super) fn begin_attempt(&mut self) -> u32 {
         self.phase = Phase::Configuring;
+        self.attempt = self.attempt.wrapping_add(1);
+        self.attempt
+    }
+
+    /// Begins an attempt in its state, which it keeps.
+    pub(super) fn begin_again(&mut self) -> u32 {
         self.attempt = self.attempt.wrapping_add(1);
         self.attempt
     }

@@ -50,6 +50,11 @@ pub(super) fn describe(event: &Event, names: &Names, ends: [Option<Occupant>; 2]
             let object = format!("{index:#06x}:{sub_index:02x}");
             format!("{}: start-up command {number}{comment} read {object}: {}", names.of(*subdevice), hex(data))
         }
+        Event::StartupIdn { subdevice, number, drive, idn, comment, data } => {
+            let comment = comment.as_ref().map_or_else(String::new, |comment| format!(" \"{comment}\""));
+            let name = names.of(*subdevice);
+            format!("{name}: start-up command {number}{comment} read {idn} of drive {drive}: {}", hex(data))
+        }
         Event::Emergency { subdevice, emergency } => {
             let (code, register) = (emergency.error_code, emergency.error_register);
             let (name, data) = (names.at_address(*subdevice), hex(&emergency.data));

@@ -2,6 +2,7 @@
 //! and exchanges data through the variables of the file (protocol 8).
 
 mod cables;
+mod commands;
 mod exported;
 mod numbers;
 mod variants;

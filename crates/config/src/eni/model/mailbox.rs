@@ -142,7 +142,9 @@ pub struct RawMailCommand {
     pub transitions: Vec<Transition>,
     /// `Comment`.
     pub comment: String,
-    /// `Data`.
+    /// Time limit in milliseconds; 0 is the tool's default.
+    pub timeout_ms: u32,
+    /// `Data`: the message after the mailbox header.
     pub data: Vec<u8>,
     /// `Disabled`: not sent.
     pub disabled: bool,

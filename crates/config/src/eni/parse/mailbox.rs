@@ -58,8 +58,12 @@ fn in_protocol<'a, T>(
     protocol: &str,
     read: impl Fn(Element<'a>) -> Result<T, EniError>,
 ) -> Result<Vec<T>, EniError> {
-    let commands = mailbox.child(protocol).and_then(|protocol| protocol.child("InitCmds"));
-    commands.map_or(Ok(Vec::new()), |commands| commands.children("InitCmd").map(read).collect())
+    let Some(protocol) = mailbox.child(protocol) else { return Ok(Vec::new()) };
+    // A profile describes what the SubDevice is, and configures nothing.
+    protocol.knows(&["InitCmds", "NetId", "Profile"]);
+    let Some(commands) = protocol.child("InitCmds") else { return Ok(Vec::new()) };
+    commands.knows(&["InitCmd"]);
+    commands.children("InitCmd").map(read).collect()
 }
 
 fn coe(element: Element<'_>) -> Result<CoeCommand, EniError> {
@@ -156,11 +160,13 @@ fn eoe(element: Element<'_>) -> Result<EoeCommand, EniError> {
 }
 
 fn raw(element: Element<'_>, protocol: &'static str) -> Result<RawMailCommand, EniError> {
+    element.knows(&["Transition", "Comment", "Timeout", "Data", "Disabled"]);
     Ok(RawMailCommand {
         place: element.place(),
         protocol,
         transitions: transitions(element)?,
         comment: element.text_of("Comment"),
+        timeout_ms: element.number_of("Timeout")?.unwrap_or_default(),
         data: element.hex_of("Data")?.unwrap_or_default(),
         disabled: element.flag_of("Disabled")?,
     })

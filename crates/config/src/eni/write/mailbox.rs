@@ -147,8 +147,7 @@ fn eoe(out: &mut Elements, of: &EoeCommand) {
 
 fn other(out: &mut Elements, of: &RawMailCommand) {
     out.within("InitCmd", |out| {
-        of.transitions.iter().for_each(|transition| out.leaf("Transition", transition.name()));
-        out.text("Comment", &of.comment);
+        head(out, &of.transitions, &of.comment, of.timeout_ms);
         out.hex("Data", &of.data);
         tail(out, &[], of.disabled);
     });

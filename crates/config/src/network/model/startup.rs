@@ -6,7 +6,8 @@ use serde::Deserialize;
 
 use crate::network::values::{Bytes, Mac, Time};
 
-/// A start-up command. It has one of the tables `sdo`, `upload`, `idn`, `ip`, `write` and `check`.
+/// A start-up command. It has one of the keys `sdo`, `upload`, `idn`, `read_idn`, `ip`, `aoe`, `voe`, `write` and
+/// `check`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -20,8 +21,14 @@ pub struct Startup {
     pub upload: Option<Upload>,
     /// SoE write.
     pub idn: Option<Idn>,
+    /// SoE read.
+    pub read_idn: Option<ReadIdn>,
     /// IP parameters (EoE).
     pub ip: Option<Ip>,
+    /// AoE: an AMS header with a request.
+    pub aoe: Option<Bytes>,
+    /// VoE: vendor, type and data of a message.
+    pub voe: Option<Bytes>,
     /// Register write.
     pub write: Option<Write>,
     /// Register that must have a value.
@@ -48,6 +55,22 @@ pub enum At {
     Os,
     /// SAFEOP to PREOP.
     Sp,
+    /// INIT to INIT: at the beginning of a bring-up; registers only.
+    Ii,
+    /// PREOP to PREOP: PREOP is requested again.
+    Pp,
+    /// SAFEOP to SAFEOP: SAFEOP is requested again.
+    Ss,
+    /// PREOP to INIT.
+    Pi,
+    /// SAFEOP to INIT.
+    Si,
+    /// OP to INIT.
+    Oi,
+    /// INIT to BOOT.
+    Ib,
+    /// BOOT to INIT.
+    Bi,
 }
 
 /// An SDO download.
@@ -96,6 +119,22 @@ pub struct Idn {
     pub idn: u16,
     /// Data, little-endian.
     pub data: Bytes,
+}
+
+/// A SoE read.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct ReadIdn {
+    /// Drive of the SubDevice, 0 to 7.
+    #[serde(default)]
+    pub drive: u8,
+    /// The IDN as a number of 16 bits.
+    pub idn: u16,
+    /// The elements as a bit mask; the value, 0x40, if the key is missing.
+    pub elements: Option<u8>,
+    /// Required data; any data if the key is missing.
+    pub data: Option<Bytes>,
 }
 
 /// IP parameters behind a SubDevice.

@@ -6,9 +6,11 @@ use core::fmt;
 
 use super::register_error::{Hex, RegisterCommandError};
 use crate::config::Transition;
+use crate::mail::MailboxError;
+use crate::mail::aoe::AoeError;
 use crate::mail::coe::{SdoAddress, SdoError};
 use crate::mail::eoe::EoeError;
-use crate::mail::soe::SoeError;
+use crate::mail::soe::{SoeAddress, SoeError};
 use crate::procedures::al_state::StateError;
 use crate::procedures::clocks::{NotLocked, SignalsError};
 use crate::role::NotPermitted;
@@ -71,6 +73,19 @@ pub enum StartupError {
         /// The value read.
         got: Vec<u8>,
     },
+    /// AoE.
+    Aoe(AoeError),
+    /// VoE.
+    Voe(MailboxError),
+    /// An IDN holds other data than required.
+    IdnValue {
+        /// The elements that were read.
+        address: SoeAddress,
+        /// The required data.
+        expected: Vec<u8>,
+        /// The data read.
+        got: Vec<u8>,
+    },
     /// A register.
     Register(RegisterCommandError),
 }
@@ -107,6 +122,11 @@ impl fmt::Display for StartupError {
             StartupError::Value { object, expected, got } => {
                 write!(f, "SDO {object}: expected {}, got {}", Hex(expected), Hex(got))
             }
+            StartupError::IdnValue { address, expected, got } => {
+                write!(f, "SoE {address}: expected {}, got {}", Hex(expected), Hex(got))
+            }
+            StartupError::Aoe(error) => error.fmt(f),
+            StartupError::Voe(error) => write!(f, "VoE: {error}"),
             StartupError::Register(error) => error.fmt(f),
         }
     }
@@ -139,6 +159,8 @@ impl core::error::Error for StartupError {
             StartupError::Sdo(error) => Some(error),
             StartupError::Soe(error) => Some(error),
             StartupError::Eoe(error) => Some(error),
+            StartupError::Aoe(error) => Some(error),
+            StartupError::Voe(error) => Some(error),
             StartupError::Register(error) => Some(error),
             _ => None,
         }

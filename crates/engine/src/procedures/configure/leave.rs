@@ -1,4 +1,5 @@
-//! Brings a SubDevice from its present state to the requested one, by the shortest path that keeps its configuration.
+//! Brings a SubDevice from its present state to the requested one, by the shortest path that keeps its configuration,
+//! and out of its configured state to INIT.
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::register::{Fmmu, SyncManager, map};
@@ -25,7 +26,50 @@ impl BringUp<'_> {
                 self.leave_safeop().await
             }
             (AlState::SafeOp, AlState::PreOp) if configured => self.leave_safeop().await,
+            (AlState::SafeOp | AlState::Op, AlState::Init | AlState::Boot) if configured => {
+                self.leave_to_init(from).await?;
+                self.up_from_init().await
+            }
+            (AlState::PreOp, AlState::Init | AlState::Boot) if self.is_prepared() => {
+                self.leave_to_init(from).await?;
+                self.up_from_init().await
+            }
             _ => self.run(Start::Unknown).await,
+        }
+    }
+
+    /// Commands to the mailbox in the present state, then INIT with cleared registers, then commands to registers.
+    async fn leave_to_init(&self, from: AlState) -> Result<(), ConfigureError> {
+        let transition = Transition::to_init(from);
+        self.command_mail(transition).await?;
+        self.take_out();
+        self.back_to_init().await?;
+        self.command_registers(transition).await
+    }
+
+    /// From BOOT to INIT. Commands of BI are sent if it is in BOOT as this session has brought it there.
+    pub(in crate::procedures) async fn leave_boot(&self) -> Result<(), ConfigureError> {
+        let (status, _) = al_state::read_status(self.bus, self.station).await?;
+        if status.al_state() == Some(AlState::Boot) && !status.error && self.mailbox.is_open() {
+            return self.leave_to_init(AlState::Boot).await;
+        }
+        self.take_out();
+        self.back_to_init().await?;
+        self.command_registers(Transition::Ii).await
+    }
+
+    /// From INIT behind BOOT to the target state. The SyncManagers of BOOT are disabled by now, and cleared.
+    pub(in crate::procedures) async fn up_from_boot(&self) -> Result<(), ConfigureError> {
+        self.clear_sync_managers().await?;
+        self.up_from_init().await
+    }
+
+    /// The state is requested again: commands of the transition to itself.
+    pub(in crate::procedures) async fn stay(&self) -> Result<(), ConfigureError> {
+        match Transition::within(self.target) {
+            Some(Transition::Ii) => self.command_registers(Transition::Ii).await,
+            Some(transition) => self.command(transition).await,
+            None => Ok(()),
         }
     }
 

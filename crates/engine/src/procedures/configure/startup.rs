@@ -3,13 +3,15 @@
 use core::time::Duration;
 
 use super::{BringUp, ConfigureError, StartupError};
-use crate::config::{IdnWrite, SdoDownload, SdoUpload, StartupAction, StartupCommand, Transition};
+use crate::config::{
+    IdnRead, IdnWrite, MailMessage, SdoDownload, SdoUpload, StartupAction, StartupCommand, Transition,
+};
 use crate::declared::SubDeviceId;
 use crate::event::Notice;
 use crate::mail::Limits;
 use crate::mail::coe::{self, SdoAddress};
-use crate::mail::eoe;
 use crate::mail::soe::{self, SoeAddress};
+use crate::mail::{aoe, eoe, voe};
 
 /// Longest object that a start-up command reads.
 const MAX_READ: usize = 0x1_0000;
@@ -58,6 +60,14 @@ impl BringUp<'_> {
                 let address = SoeAddress::value(*drive, *idn);
                 soe::write(&self.mailbox, address, data, limits(timeouts.soe)).await.map_err(StartupError::Soe)
             }
+            StartupAction::IdnRead(read) => self.read_idn(number, command, read, limits(timeouts.soe)).await,
+            StartupAction::Mail(MailMessage::Aoe(message)) => {
+                aoe::send(&self.mailbox, message, limits(timeouts.sdo)).await.map_err(StartupError::Aoe)
+            }
+            StartupAction::Mail(MailMessage::Voe(message)) => {
+                let limit = command.limit.unwrap_or(timeouts.mailbox_request);
+                voe::send_whole(&self.mailbox, message, limit).await.map_err(StartupError::Voe)
+            }
             StartupAction::Ip(settings) => {
                 eoe::set_ip(&self.mailbox, 0, settings, limits(timeouts.eoe)).await.map_err(StartupError::Eoe)
             }
@@ -90,6 +100,29 @@ impl BringUp<'_> {
                     comment,
                     data,
                 });
+                Ok(())
+            }
+        }
+    }
+
+    async fn read_idn(
+        &self,
+        number: usize,
+        command: &StartupCommand,
+        read: &IdnRead,
+        limits: Limits,
+    ) -> Result<(), StartupError> {
+        let IdnRead { drive, idn, elements, ref expected } = *read;
+        let address = SoeAddress { drive, idn, elements };
+        let data = soe::read(&self.mailbox, address, limits, MAX_READ).await.map_err(StartupError::Soe)?;
+        match expected {
+            Some(expected) if *expected != data => {
+                Err(StartupError::IdnValue { address, expected: expected.clone(), got: data })
+            }
+            Some(_) => Ok(()),
+            None => {
+                let (subdevice, comment) = (SubDeviceId(self.index), command.comment.clone());
+                self.bus.notice(Notice::StartupIdn { subdevice, number, drive, idn, comment, data });
                 Ok(())
             }
         }

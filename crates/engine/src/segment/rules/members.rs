@@ -309,7 +309,12 @@ impl Segment {
         let exchanges = member.exchanges(state);
         match member.phase {
             Phase::Absent => self.board.set_excused(index, !exchanges),
-            Phase::Settled(is) if is == state => {}
+            Phase::Settled(is) if is == state => {
+                if member.has_commands_within(state) {
+                    let attempt = member.begin_again();
+                    effects.start(Task::RepeatState { index, attempt });
+                }
+            }
             Phase::Settled(_) | Phase::Configuring => {
                 let attempt = member.begin_attempt();
                 effects.start(Task::ChangeState { index, attempt, before });

@@ -139,7 +139,7 @@ fn mailbox(subdevice: &SubDevice, config: &SubDeviceConfig) -> Option<MailboxDes
     let standard = match (pair, given) {
         ((Some(out), Some(inward)), _) => layout(out.start, out.length, inward.start, inward.length),
         (_, Some(Mailbox { send: Some(send), receive: Some(receive), .. })) => of_buffers(send, receive),
-        (_, Some(mailbox)) if !mailbox.coe.is_empty() || !mailbox.soe.is_empty() || !mailbox.eoe.is_empty() => MAILBOX,
+        (_, Some(mailbox)) if has_commands(mailbox) => MAILBOX,
         _ => return None,
     };
     let bootstrap = given.and_then(|mailbox| mailbox.bootstrap.as_ref());
@@ -156,6 +156,11 @@ fn mailbox(subdevice: &SubDevice, config: &SubDeviceConfig) -> Option<MailboxDes
         coe_details: CoeDetails(if protocols.coe() { coe } else { 0 }),
         response_time: ANSWER,
     })
+}
+
+/// Whether commands go through the mailbox.
+fn has_commands(of: &Mailbox) -> bool {
+    !of.coe.is_empty() || !of.soe.is_empty() || !of.eoe.is_empty() || !of.others.is_empty()
 }
 
 fn of_buffers(send: &MailboxBuffer, receive: &MailboxBuffer) -> MailboxLayout {
@@ -183,6 +188,8 @@ fn protocols(mailbox: Option<&Mailbox>) -> MailboxProtocols {
         (!mailbox.coe.is_empty(), MailboxProtocols::COE),
         (!mailbox.soe.is_empty(), MailboxProtocols::SOE),
         (!mailbox.eoe.is_empty(), MailboxProtocols::EOE),
+        (mailbox.others.iter().any(|command| command.protocol == "AoE"), MailboxProtocols::AOE),
+        (mailbox.others.iter().any(|command| command.protocol == "VoE"), MailboxProtocols::VOE),
     ];
     MailboxProtocols(used.into_iter().filter(|(used, _)| *used).fold(named, |all, (_, one)| all | one))
 }
