@@ -184,9 +184,9 @@ figures() {
 demo() {
     local too_large=0
     cargo run --release
-    small ringcat 9700000 || too_large=1
+    small ringcat 9800000 || too_large=1
     small ringcatd 6800000 || too_large=1
-    small ethercat 1750000 || too_large=1
+    small ethercat 1760000 || too_large=1
     return "$too_large"
 }
 
