@@ -5,7 +5,7 @@
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
-pub use ringcat_engine::main_device::snapshot::{CableSnapshot, ClockSnapshot, Snapshot};
+pub use ringcat_engine::main_device::snapshot::{Activity, CableSnapshot, ClockSnapshot, Snapshot};
 use serde::{Deserialize, Serialize};
 
 pub use crate::information::SegmentOverview;

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 use ringcat_control::Client;
 use ringcat_control::client::ClientError;
-use ringcat_control::message::{Answer, Query};
+use ringcat_control::message::{Activity, Answer, Query};
 use ringcat_control::tool::{MasterReport, Piece, ToolAnswer, ToolQuery};
 
 use crate::arguments::Arguments;
@@ -28,10 +28,14 @@ const START: Duration = Duration::from_secs(20);
 const STILL: Duration = Duration::from_millis(500);
 /// Interval of looks.
 const LOOK: Duration = Duration::from_millis(2);
-/// An interface that was just switched on has a link within this time.
+/// An interface that was just switched on has a link, and a segment with a link was scanned, within this time.
 const LINK: Duration = Duration::from_secs(3);
 /// Register AL Status in PREOP without an error (ETG.1000.6).
 const PREOP: u16 = 2;
+/// Beginning of the event of a scan that failed.
+const FAILED_SCAN: &str = "scan failed";
+/// Where no frame returns there is no scan.
+const NO_SLAVE: &str = "no slave answers: is the cable plugged in at its input, and has it power?";
 /// The master that the daemon drives.
 const MASTER: u32 = 0;
 
@@ -182,8 +186,7 @@ fn check(client: &mut Client) -> Result<(), Failure> {
     }
 }
 
-/// Waits until the segment is known and its SubDevices are in PREOP, or stay where they are. Without a link nothing is
-/// known.
+/// Waits until the segment is scanned and its SubDevices are in PREOP, or stay where they are.
 fn settle(client: &mut Client, begin: Instant) -> Result<(), Failure> {
     let (mut last, mut since, mut linked) = (None, Instant::now(), None);
     loop {
@@ -195,9 +198,15 @@ fn settle(client: &mut Client, begin: Instant) -> Result<(), Failure> {
         if last.as_ref() != Some(&states) {
             (last, since) = (Some(states), Instant::now());
         }
-        let is_still = since.elapsed() >= STILL && linked.is_some_and(|since| since.elapsed() >= STILL);
-        if has_link && !report.is_scanning && (are_in_preop || is_still) {
-            return Ok(());
+        let is_settled = are_in_preop || since.elapsed() >= STILL;
+        if has_link && !report.is_scanning && is_settled {
+            match activity(client)? {
+                Activity::Scanned => return Ok(()),
+                Activity::Unscanned if linked.is_some_and(|since: Instant| since.elapsed() >= LINK) => {
+                    return Err(Failure::failed(why_no_scan(client)?));
+                }
+                _ => {}
+            }
         }
         if !has_link && begin.elapsed() >= LINK {
             return Err(Failure::failed("no link: is the cable plugged in, and has the first slave power?"));
@@ -206,6 +215,28 @@ fn settle(client: &mut Client, begin: Instant) -> Result<(), Failure> {
             return Err(late("the slaves are not in PREOP"));
         }
         std::thread::sleep(LOOK);
+    }
+}
+
+fn activity(client: &mut Client) -> Result<Activity, Failure> {
+    match client.ask_patiently(MASTER, &Query::State, &[])? {
+        (Answer::State(state), _) => Ok(state.activity),
+        _ => Err(unexpected()),
+    }
+}
+
+/// What the last failed scan has said.
+fn why_no_scan(client: &mut Client) -> Result<String, Failure> {
+    let (mut from, mut last) = (0, None);
+    loop {
+        let (answer, _) = client.ask_patiently(MASTER, &Query::Events { from }, &[])?;
+        let Answer::Events { next, events, .. } = answer else { return Err(unexpected()) };
+        let failed = events.iter().rev().find(|event| event.text.starts_with(FAILED_SCAN));
+        last = failed.map(|event| event.text.clone()).or(last);
+        if events.is_empty() || next <= from {
+            return Ok(last.unwrap_or_else(|| NO_SLAVE.to_owned()));
+        }
+        from = next;
     }
 }
 

@@ -60,11 +60,11 @@ impl Driving {
     ///
     /// # Errors
     /// What is wrong, for the operator.
-    pub fn start(opened: &Opened, lasting: &Lasting<'_>, handover: Handover) -> Result<Driving, String> {
+    pub fn start(opened: &Arc<Opened>, lasting: &Lasting<'_>, handover: Handover) -> Result<Driving, String> {
         let adopted = adopt_links(opened.links(), opened.duplicates()?);
         let (cyclic, acyclic) = adopted.map_err(|error| error.to_string())?;
         let main_address = acyclic.addresses().main.0;
-        let acyclic = QuietLinks::new(acyclic, cyclic, lasting.listened.clone());
+        let acyclic = QuietLinks::new(acyclic, cyclic, lasting.listened.clone(), opened.clone());
         let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
         let supervisor = match Knowledge::from_bytes(lasting.knowledge) {
             Ok(knowledge) => SupervisorThread::start_resumed(acyclic, &options, (knowledge, handover), || ()),

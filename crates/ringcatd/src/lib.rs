@@ -7,7 +7,7 @@
 //!   a process of its own;
 //! * [`segment_process`]: a simulated segment in a process of its own;
 //! * [`master`]: a master with its links; [`driver`]: the process that drives it; [`driving`]: this daemon while it
-//!   does;
+//!   does; [`others`]: another MainDevice that does;
 //! * [`ethernet`]: network interfaces of EoE, which outlast applications;
 //! * [`owner`]: questions to an application that drives a master; [`tenure`]: its time, and what ends it;
 //!   [`process_state`]: what the kernel tells of its process; [`owner_lock`]: what of it outlives the daemon;
@@ -31,6 +31,7 @@ pub mod log;
 pub mod master;
 pub mod opened;
 pub mod opener;
+pub mod others;
 pub mod owner;
 pub mod owner_lock;
 pub mod process_state;

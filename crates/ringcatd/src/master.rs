@@ -4,12 +4,11 @@
 //! each time it comes back, so that nothing that had it before reaches the segment any more.
 
 use std::os::fd::AsRawFd;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use ringcat::daemon::{Lines, serving};
-use ringcat::foreign::Listened;
 use ringcat::{AlState, Handover, Knowledge};
 use ringcat_control::message::{Answer, HandedBus, MasterState, Query, ToolAnswer, ToolQuery};
 use ringcat_control::{Content, Message, Refusal};
@@ -20,14 +19,13 @@ use crate::driving::{Driving, Lasting};
 use crate::ethernet::EthernetInterfaces;
 use crate::log::say;
 use crate::opened::Opened;
+use crate::others::Others;
 use crate::owner::{Answered, OwnerLink};
 use crate::owner_lock::OwnerLock;
 use crate::wires::Wires;
 
 /// An owner is told within this time that the daemon has failed.
 const TELL: Duration = Duration::from_millis(100);
-/// It has been listened to the links within this time after they have a carrier.
-const LISTENED: Duration = Duration::from_secs(1);
 /// What it is told, and the operator.
 const FAILED: &str = "a thread of the daemon has failed";
 
@@ -72,9 +70,7 @@ pub struct Master {
     lines: Arc<Mutex<Lines>>,
     /// Level of messages, whatever drives the master.
     debug_level: AtomicU32,
-    /// What was heard on its links before the first frame, and whether the operator was told of another MainDevice.
-    listened: Arc<Listened>,
-    is_told: AtomicBool,
+    others: Others,
 }
 
 /// How the time of an owner has ended.
@@ -140,8 +136,7 @@ impl Master {
             knowledge: Mutex::default(),
             lines: Arc::default(),
             debug_level: AtomicU32::new(debug_level),
-            listened: Arc::new(if is_shared { Listened::default() } else { Listened::not_shared() }),
-            is_told: AtomicBool::new(false),
+            others: Others::new(number, is_shared),
         };
         master.drive(Handover::Orderly);
         master.prepare();
@@ -174,33 +169,15 @@ impl Master {
         let (owner, fault) = match &*self.driver.lock() {
             Driver::Owner(owner, _) => (Some(owner.owner().clone()), None),
             Driver::Fault(cause) => (None, Some(cause.clone())),
-            Driver::Daemon(..) => (None, self.occupied()),
+            Driver::Daemon(..) => (None, self.others.cause()),
             Driver::Changing => (None, None),
         };
         MasterState { master: self.number, links: self.links.clone(), owner, fault }
     }
 
-    /// Why the daemon sends nothing, although it has the links: another MainDevice drives the segment.
-    fn occupied(&self) -> Option<String> {
-        self.listened.heard().map(|heard| heard.to_string())
-    }
-
-    /// Waits until it is known whether another MainDevice drives the segment. Without a carrier there is nothing to
-    /// wait for.
+    /// Waits until it is known whether another MainDevice drives the segment, if a link has a carrier.
     pub fn listen(&self) {
-        self.listened.wait(LISTENED);
-        self.tell_of_others();
-    }
-
-    /// Tells the operator once that another MainDevice drives the segment, and that it does no more.
-    fn tell_of_others(&self) {
-        let occupied = self.occupied();
-        if self.is_told.swap(occupied.is_some(), Ordering::AcqRel) != occupied.is_some() {
-            match occupied {
-                Some(cause) => say(format_args!("master {} is not driven: {cause}", self.number)),
-                None => say(format_args!("master {}: the other MainDevice is silent", self.number)),
-            }
-        }
+        self.others.listen();
     }
 
     /// Answers a question, from the process that drives it.
@@ -222,7 +199,7 @@ impl Master {
     fn ask_driver(&self, what: Query, bytes: Vec<u8>) -> Answered {
         let master = self.number;
         let supervisor = match &*self.driver.lock() {
-            Driver::Daemon(driving, opened) => match self.occupied() {
+            Driver::Daemon(driving, opened) => match self.others.cause() {
                 Some(cause) => return Err(Refusal::Fault { master, cause }),
                 None => Ok((driving.supervisor().clone(), opened.clone())),
             },
@@ -249,14 +226,12 @@ impl Master {
     /// # Errors
     /// Why not. The daemon drives the master then, as far as it did before.
     pub fn hand_over(&self, owner: &Arc<OwnerLink>) -> Result<Tenancy<'_>, Refusal> {
-        self.listen();
-        if let Some(cause) = self.occupied() {
-            return Err(Refusal::Fault { master: self.number, cause });
-        }
+        self.others.permit()?;
         let (driving, opened) = self.driver.take_from_daemon(self.number, CHANGE)?;
         let tenancy = Tenancy { master: self, opened, is_over: false };
         let bytes = driving.hand_over();
         locked(&self.knowledge).clone_from(&bytes);
+        self.others.is_ours();
         let sent = self.send_bus(owner, &tenancy.opened, bytes);
         self.driver.set(Driver::Owner(owner.clone(), tenancy.opened.clone()));
         match sent {
@@ -365,7 +340,7 @@ impl Master {
     pub fn supervise(&self) {
         self.prepare();
         self.leave_alone();
-        self.tell_of_others();
+        self.others.tell();
         let is_faulty = matches!(&*self.driver.lock(), Driver::Fault(_));
         if is_faulty {
             self.drive(Handover::AfterCrash);
@@ -394,7 +369,7 @@ impl Master {
             match &*driver {
                 Driver::Daemon(..) => {
                     locked(&self.wires).leave();
-                    self.listened.forget();
+                    self.others.forget();
                     std::mem::replace(&mut *driver, Driver::Fault(cause.clone()))
                 }
                 // An application has got it meanwhile.
@@ -436,7 +411,7 @@ impl Master {
         let knowledge = locked(&self.knowledge);
         let (lines, debug_level) = (self.lines.clone(), self.debug_level.load(Ordering::Acquire));
         let interfaces = self.interfaces.clone();
-        let listened = self.listened.clone();
+        let listened = self.others.listened();
         let lasting = Lasting { number: self.number, knowledge: &knowledge, lines, debug_level, interfaces, listened };
         let driving = Driving::start(&opened, &lasting, handover)?;
         for absent in opened.absent() {

@@ -2,8 +2,10 @@
 //! end.
 
 use std::os::fd::{AsFd, OwnedFd};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use ringcat::foreign::Ears;
 use ringcat_control::message::{HandedLink, HandedLinks};
 use ringcat_link::capabilities::{self, Capabilities};
 use ringcat_link::packet_socket::binding::{give, given};
@@ -22,6 +24,8 @@ pub struct Opened {
     /// In the order of [`HandedLinks`].
     descriptors: Vec<OwnedFd>,
     state: Mutex<State>,
+    /// How often sockets got an interface.
+    bindings: AtomicU32,
 }
 
 /// What the sockets lead to.
@@ -49,7 +53,7 @@ struct Followed {
 impl Opened {
     /// Pipes to a simulated segment.
     pub fn pipes(links: HandedLinks, descriptors: Vec<OwnedFd>) -> Opened {
-        Opened { links, descriptors, state: Mutex::new(State::Pipes) }
+        Opened { links, descriptors, state: Mutex::new(State::Pipes), bindings: AtomicU32::new(0) }
     }
 
     /// Sockets that get these interfaces, as far as they are there.
@@ -79,7 +83,8 @@ impl Opened {
         let mut links = links.into_iter();
         let main = links.next().ok_or_else(|| "a master has no link".to_owned())?;
         let links = HandedLinks { main, redundant: links.next() };
-        Ok(Opened { links, descriptors: sockets, state: Mutex::new(State::Interfaces(followed)) })
+        let state = Mutex::new(State::Interfaces(followed));
+        Ok(Opened { links, descriptors: sockets, state, bindings: AtomicU32::new(0) })
     }
 
     /// Interfaces that are not there.
@@ -144,6 +149,7 @@ impl Opened {
             }
             // It may be gone again; the next look tries again.
             let is_given = sockets().all(|socket| give(socket.as_fd(), &one.name, interface).is_ok());
+            self.bindings.fetch_add(1, Ordering::AcqRel);
             if is_given && !std::mem::replace(&mut one.is_there, true) {
                 changes.push(format!("interface {} is there", one.name));
             } else if is_given {
@@ -188,6 +194,23 @@ impl Opened {
             // It may be gone: then it comes back as its operator has it.
             let _ = interface::switch(&one.name, true);
         }
+    }
+}
+
+impl Ears for Opened {
+    fn binding(&self) -> Option<u32> {
+        let state = self.state();
+        let is_bound = match &*state {
+            State::Pipes => true,
+            State::Revoked => false,
+            State::Interfaces(all) => all.iter().enumerate().all(|(number, one)| {
+                // One that is not there has no carrier.
+                let Some(Found { interface, .. }) = one.device.find(&[]).ok().flatten() else { return true };
+                let has_it = |socket: &OwnedFd| given(socket.as_fd()).is_ok_and(|index| index == Some(interface.index));
+                of_link(&self.descriptors, number, all.len()).all(has_it)
+            }),
+        };
+        is_bound.then(|| self.bindings.load(Ordering::Acquire))
     }
 }
 

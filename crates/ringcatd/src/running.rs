@@ -63,7 +63,10 @@ pub fn run(setup: &Setup) -> Result<(), String> {
         let started = master(setup, option, &path, &opener);
         masters.push(started.map_err(|error| format!("master {}: {error}", option.master))?);
     }
-    masters.iter().for_each(Master::listen);
+    // The command that has started it waits itself.
+    if !setup.ends_with_input {
+        masters.iter().for_each(Master::listen);
+    }
     let daemon = Daemon::serve(masters, socket, Duration::from_millis(setup.stop_limit))?;
     say(format_args!("listens at {}", path.display()));
     serve(&daemon, &mut up_down, &held);

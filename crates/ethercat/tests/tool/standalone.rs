@@ -131,6 +131,44 @@ fn states_without_a_daemon_are_reached_when_the_command_ends() {
     std::fs::remove_dir_all(directory).expect("it is ours");
 }
 
+/// A network namespace with both ends of a cable that no segment is at; it is removed at the end.
+struct Namespace(String);
+
+impl Namespace {
+    fn ip(&self, arguments: &str) {
+        let done = Command::new("ip").args(arguments.replace("NS", &self.0).split(' ')).status().expect("ip is there");
+        assert!(done.success(), "ip {arguments}");
+    }
+}
+
+impl Drop for Namespace {
+    fn drop(&mut self) {
+        self.ip("netns del NS");
+    }
+}
+
+// covers: daemon
+#[test]
+fn a_segment_that_cannot_be_scanned_is_no_empty_one() {
+    if std::env::var_os("RINGCAT_ON_THE_WIRE").is_none() || !has_daemon() {
+        println!("skipped: RINGCAT_ON_THE_WIRE is not set");
+        return;
+    }
+    let place = Namespace(format!("ethercat{}", std::process::id()));
+    place.ip("netns add NS");
+    place.ip("-n NS link add near0 type veth peer name far0");
+    for end in ["near0", "far0"] {
+        place.ip(&format!("-n NS link set {end} addrgenmode none up"));
+    }
+    for words in ["slaves", "states OP"] {
+        let mut command = Command::new("ip");
+        command.args(["netns", "exec", &place.0, PROGRAM]).args(words.split(' ')).args(["--main", "near0"]);
+        let output = command.stdin(Stdio::null()).output().expect("it starts");
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(1) && text.starts_with("no slave answers: "), "{text}");
+    }
+}
+
 // covers: daemon
 #[test]
 fn a_reader_that_closes_its_end_ends_a_command_that_follows_events() {

@@ -1,5 +1,6 @@
 //! What was heard on the links of a segment before the first frame.
 
+use std::fmt;
 use std::hash::{BuildHasher, RandomState};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -8,9 +9,16 @@ use super::{Heard, LISTEN};
 
 /// Two MainDevices that begin at the same time do not listen equally long: the one that has to listen longer hears the
 /// other. Up to this time is added.
-const SPREAD: Duration = Duration::from_millis(100);
+const SPREAD: Duration = Duration::from_millis(250);
 /// Interval of looks of a thread that waits.
 const LOOK: Duration = Duration::from_millis(1);
+
+/// The sockets of links that listen.
+pub trait Ears: fmt::Debug + Send + Sync {
+    /// The number of times that they were bound to an interface; `None` while one is not bound to an interface that is
+    /// there, and hears nothing.
+    fn binding(&self) -> Option<u32>;
+}
 
 /// Whether a segment may be driven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,6 +85,11 @@ impl Listened {
         while self.phase() == ListenedPhase::Listening && begin.elapsed() < limit {
             std::thread::sleep(LOOK);
         }
+    }
+
+    /// An application drives the segment from now on.
+    pub fn set_free(&self) {
+        self.set(ListenedPhase::Free);
     }
 
     /// The links are others from now on.

@@ -10,12 +10,14 @@ use ringcat_engine::time::Instant;
 use ringcat_link::WakeUp;
 use ringcat_wire::frame::MacAddress;
 
-use super::{Heard, LAST_FRAMES, Listened, ListenedPhase, has_commands};
+use super::{Ears, Heard, LAST_FRAMES, Listened, ListenedPhase, has_commands};
 use crate::links::{Links, PerLink};
 use crate::text::address_of_sender;
 
-/// Interval of looks while it is listened.
-const LOOK: Duration = Duration::from_millis(5);
+/// Interval of looks while it is listened: of two that begin at once, the first one is heard by the other.
+const LOOK: Duration = Duration::from_millis(1);
+/// The same while there is nothing to hear, or another MainDevice is heard.
+const LONG_LOOK: Duration = Duration::from_millis(5);
 /// Frames that a look takes at most from each half.
 const FRAMES: usize = 256;
 
@@ -39,9 +41,12 @@ struct Quiet<L> {
 #[derive(Debug)]
 struct Ear {
     listened: Arc<Listened>,
+    ears: Arc<dyn Ears>,
+    /// What the ears were when the silence began.
+    binding: Option<u32>,
     /// The carriers, and since when they are so.
     carriers: [bool; 2],
-    carriers_since: Instant,
+    carriers_since: [Instant; 2],
     /// Since when nothing was heard.
     silent_since: Instant,
 }
@@ -49,9 +54,11 @@ struct Ear {
 impl<L: Links> QuietLinks<L> {
     /// Links of an acyclic half. They listen with those of the cyclic half too, unless the segment is free already.
     /// Nothing may have been sent on any of them.
-    pub fn new(acyclic: L, cyclic: L, listened: Arc<Listened>) -> QuietLinks<L> {
+    pub fn new(acyclic: L, cyclic: L, listened: Arc<Listened>, ears: Arc<dyn Ears>) -> QuietLinks<L> {
         let now = acyclic.now();
-        let ear = Ear { listened, carriers: [false; 2], carriers_since: now, silent_since: now };
+        let binding = ears.binding();
+        let (carriers, carriers_since) = ([false; 2], [now; 2]);
+        let ear = Ear { listened, ears, binding, carriers, carriers_since, silent_since: now };
         let is_free = ear.listened.phase() == ListenedPhase::Free;
         let mut links = QuietLinks { links: acyclic, quiet: (!is_free).then_some(Quiet { other_half: cyclic, ear }) };
         links.look();
@@ -78,16 +85,23 @@ impl<L: Links> QuietLinks<L> {
 
     /// The end of a wait: while it is listened, the next look.
     fn end_of(&self, now: Instant, until: Instant) -> Instant {
-        if self.quiet.is_some() { until.min(now + LOOK) } else { until }
+        let Some(Quiet { ear, .. }) = &self.quiet else { return until };
+        let is_listening = ear.listened.phase() == ListenedPhase::Listening;
+        until.min(now + if is_listening { LOOK } else { LONG_LOOK })
     }
 }
 
 impl Ear {
     fn follow_carriers(&mut self, now: Instant, carriers: [bool; 2]) {
-        if carriers != self.carriers {
-            (self.carriers, self.carriers_since, self.silent_since) = (carriers, now, now);
+        for link in Link::ALL.map(Link::index) {
+            if carriers[link] != self.carriers[link] {
+                (self.carriers_since[link], self.silent_since) = (now, now);
+            }
         }
+        self.carriers = carriers;
         match (carriers.contains(&true), self.listened.phase()) {
+            // It still drives the segment that the cable leads to, as far as is known.
+            (false, ListenedPhase::Occupied(_)) => {}
             (false, _) => self.listened.set(ListenedPhase::NoCarrier),
             (true, ListenedPhase::NoCarrier) => self.listened.set(ListenedPhase::Listening),
             (true, _) => {}
@@ -96,7 +110,7 @@ impl Ear {
 
     /// A frame has arrived.
     fn take(&mut self, now: Instant, arrived_on: Link, frame: &[u8]) {
-        let is_late = now.since(self.carriers_since) >= LAST_FRAMES;
+        let is_late = now.since(self.carriers_since[arrived_on.index()]) >= LAST_FRAMES;
         let Some(source) = address_of_sender(frame).filter(|_| is_late && has_commands(frame)) else { return };
         self.silent_since = now;
         if self.listened.heard().is_none() {
@@ -104,9 +118,17 @@ impl Ear {
         }
     }
 
-    /// Whether nothing was heard for long enough.
-    fn is_over(&self, now: Instant) -> bool {
-        self.carriers.contains(&true) && now.since(self.silent_since) >= self.listened.lasts()
+    /// Whether nothing was heard for long enough, with the same ears all the time.
+    fn is_over(&mut self, now: Instant) -> bool {
+        if !self.carriers.contains(&true) || now.since(self.silent_since) < self.listened.lasts() {
+            return false;
+        }
+        let binding = self.ears.binding();
+        let has_heard = binding.is_some() && binding == self.binding;
+        if !has_heard {
+            (self.binding, self.silent_since) = (binding, now);
+        }
+        has_heard
     }
 }
 
@@ -189,6 +211,7 @@ impl<L: Links> Links for QuietLinks<L> {
 mod tests {
     use std::cell::RefCell;
     use std::rc::Rc;
+    use std::sync::atomic::{AtomicU32, Ordering};
 
     use super::*;
     use crate::foreign::LISTEN;
@@ -243,7 +266,20 @@ mod tests {
         frame
     }
 
+    /// What the sockets are bound to.
+    #[derive(Debug, Default)]
+    struct Sockets(AtomicU32);
+
+    impl Ears for Sockets {
+        fn binding(&self) -> Option<u32> {
+            Some(self.0.load(Ordering::Relaxed)).filter(|binding| *binding != DEAF)
+        }
+    }
+
+    const DEAF: u32 = u32::MAX;
+
     struct Bench {
+        sockets: Arc<Sockets>,
         world: Rc<RefCell<World>>,
         links: QuietLinks<Half>,
         listened: Arc<Listened>,
@@ -257,8 +293,9 @@ mod tests {
             let listened = Arc::new(Listened::lasting(LISTEN));
             let halves = [is_acyclic, !is_acyclic].map(|it| Half(world.clone(), it));
             let [acyclic, cyclic] = halves;
-            let links = QuietLinks::new(acyclic, cyclic, listened.clone());
-            Bench { world, links, listened, passed_on: 0 }
+            let sockets = Arc::new(Sockets::default());
+            let links = QuietLinks::new(acyclic, cyclic, listened.clone(), sockets.clone());
+            Bench { sockets, world, links, listened, passed_on: 0 }
         }
 
         /// This many milliseconds, each with a look and an attempt to send.
@@ -339,11 +376,50 @@ mod tests {
 
     // covers: other-main-device
     #[test]
+    fn what_was_heard_without_a_socket_at_the_interface_does_not_count() {
+        let mut bench = Bench::new(true, [true; 2]);
+        bench.sockets.0.store(DEAF, Ordering::Relaxed);
+        bench.run(2_000);
+        assert_eq!(bench.sent(), 0, "no socket is bound");
+        bench.sockets.0.store(1, Ordering::Relaxed);
+        bench.run(499);
+        assert_eq!(bench.sent(), 0, "it was bound in the middle of the silence at the earliest");
+        bench.run(2);
+        assert_eq!(bench.listened.phase(), ListenedPhase::Free);
+        let mut bench = Bench::new(true, [true; 2]);
+        bench.run(200);
+        bench.sockets.0.store(1, Ordering::Relaxed);
+        bench.run(200);
+        assert_eq!(bench.sent(), 0, "another interface");
+    }
+
+    // covers: other-main-device
+    #[test]
+    fn a_link_that_flaps_does_not_hide_what_arrives_on_the_other_one() {
+        let mut bench = Bench::new(true, [true; 2]);
+        for turn in 0..200 {
+            bench.run(12);
+            bench.world.borrow_mut().carriers = [true, turn % 2 == 0];
+            bench.arrives(Link::Main, 0x10);
+        }
+        assert_eq!(bench.listened.heard().map(|heard| heard.arrived_on), Some(Link::Main));
+        // A cable that is pulled out leads to the same segment when it comes back.
+        bench.world.borrow_mut().carriers = [false; 2];
+        bench.run(1_000);
+        assert!(bench.listened.heard().is_some() && bench.sent() == 0);
+        bench.world.borrow_mut().carriers = [true; 2];
+        bench.run(251);
+        assert_eq!((bench.sent(), bench.listened.phase()), (1, ListenedPhase::Free));
+    }
+
+    // covers: other-main-device
+    #[test]
     fn a_free_segment_is_driven_at_once() {
         let world = Rc::new(RefCell::new(World { carriers: [true; 2], ..World::default() }));
         let halves = [true, false].map(|it| Half(world.clone(), it));
         let [acyclic, cyclic] = halves;
-        let mut links = QuietLinks::new(acyclic, cyclic, Arc::new(Listened::not_shared()));
+        let mut links =
+            QuietLinks::new(acyclic, cyclic, Arc::new(Listened::not_shared()), Arc::new(Sockets::default()));
         links.send(Link::Main, &frame(0x10));
         assert_eq!(world.borrow().sent, 1);
     }

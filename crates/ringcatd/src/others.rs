@@ -1,0 +1,82 @@
+//! Another MainDevice on the segment of a master: heard before the daemon sends anything.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use ringcat::foreign::{Listened, ListenedPhase};
+use ringcat_control::Refusal;
+
+use crate::log::say;
+
+/// It has been listened to the links within this time after they have a carrier.
+const LISTENED: Duration = Duration::from_secs(1);
+
+/// What is known of other MainDevices on a segment.
+#[derive(Debug)]
+pub struct Others {
+    master: u32,
+    listened: Arc<Listened>,
+    /// The operator was told of one.
+    is_told: AtomicBool,
+}
+
+impl Others {
+    /// None is known. A segment that is not shared has none.
+    pub fn new(master: u32, is_shared: bool) -> Others {
+        let listened = Arc::new(if is_shared { Listened::default() } else { Listened::not_shared() });
+        Others { master, listened, is_told: AtomicBool::new(false) }
+    }
+
+    /// For links that listen.
+    pub fn listened(&self) -> Arc<Listened> {
+        self.listened.clone()
+    }
+
+    /// Why the daemon sends nothing, although it has the links: another MainDevice drives the segment.
+    pub fn cause(&self) -> Option<String> {
+        self.listened.heard().map(|heard| heard.to_string())
+    }
+
+    /// Waits until it is known whether another MainDevice drives the segment. Without a carrier there is nothing to
+    /// wait for.
+    pub fn listen(&self) {
+        self.listened.wait(LISTENED);
+        self.tell();
+    }
+
+    /// Whether an application may have the segment; waits until it is known.
+    ///
+    /// # Errors
+    /// Another MainDevice drives it, or carriers come and go.
+    pub fn permit(&self) -> Result<(), Refusal> {
+        self.listen();
+        let master = self.master;
+        match self.cause() {
+            Some(cause) => Err(Refusal::Fault { master, cause }),
+            None if self.listened.phase() == ListenedPhase::Listening => Err(Refusal::Changing { master }),
+            None => Ok(()),
+        }
+    }
+
+    /// An application drives the segment: its frames are not those of another MainDevice when it ends.
+    pub fn is_ours(&self) {
+        self.listened.set_free();
+    }
+
+    /// The links are others from now on.
+    pub fn forget(&self) {
+        self.listened.forget();
+    }
+
+    /// Tells the operator once that another MainDevice drives the segment, and that it does no more.
+    pub fn tell(&self) {
+        let (master, cause) = (self.master, self.cause());
+        if self.is_told.swap(cause.is_some(), Ordering::AcqRel) != cause.is_some() {
+            match cause {
+                Some(cause) => say(format_args!("master {master} is not driven: {cause}")),
+                None => say(format_args!("master {master}: the other MainDevice is silent")),
+            }
+        }
+    }
+}
