@@ -228,10 +228,12 @@ mod tests {
         assert!(lines.contains(&"clocks      SubDevice 3 is the reference and runs free".to_owned()));
         let drive = lines.last().unwrap();
         let columns: Vec<&str> = drive.split_whitespace().collect();
-        let expected = ["3", "1004", "position", "3", "(0x9a)", "(0x30924)", "48", "48", "128", "8", "1ms", "Drive"];
+        let expected = ["3", "1004", "position", "3", "(0x9a)", "(0x30924)", "48", "48", "128", "9", "1ms", "Drive"];
         assert_eq!(columns, expected);
-        let notices = not_followed(&configuration);
-        assert!(notices.iter().any(|line| line.contains("not sent at OI") && line.ends_with("[SubDevice 3]")));
+        // A register that RingCAT controls itself.
+        let ports = SMALL.replace("<Ado>3840</Ado>", "<Ado>256</Ado>");
+        let notices = not_followed(&EniFile::from_bytes(ports.as_bytes()).unwrap().configuration);
+        assert!(notices.iter().any(|line| line.contains("ports and forwarding") && line.ends_with("[SubDevice 3]")));
         let details = details::lines(&model, &configuration);
         assert!(
             details
@@ -252,7 +254,7 @@ mod tests {
         let json = serde_json::to_value(json::json(&model, &configuration)).unwrap();
         assert_eq!(json["subdevices"][3]["station"], 1004);
         assert_eq!(json["subdevices"][3]["sync_managers"][2]["length"], 6);
-        assert_eq!(json["subdevices"][3]["startup"].as_array().unwrap().len(), 8);
+        assert_eq!(json["subdevices"][3]["startup"].as_array().unwrap().len(), 9);
         assert_eq!(json["image"]["areas"][1]["image_bit"], 20);
         assert_eq!(json["image"]["copies"][1]["output_bit"], 20);
         assert_eq!(json["tasks"][0]["cycle_ns"], 2_000_000);
