@@ -14,7 +14,7 @@ use crate::text::address;
 mod listened;
 mod quiet;
 
-pub use listened::{Ears, Listened, ListenedPhase};
+pub use listened::{Listened, ListenedPhase, ListeningSockets};
 pub use quiet::QuietLinks;
 
 /// How long frames are to be listened for: longer than the cycle of all but the slowest MainDevices.

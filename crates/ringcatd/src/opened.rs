@@ -5,7 +5,7 @@ use std::os::fd::{AsFd, OwnedFd};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use ringcat::foreign::Ears;
+use ringcat::foreign::ListeningSockets;
 use ringcat_control::message::{HandedLink, HandedLinks};
 use ringcat_link::capabilities::{self, Capabilities};
 use ringcat_link::packet_socket::binding::{give, given};
@@ -197,7 +197,7 @@ impl Opened {
     }
 }
 
-impl Ears for Opened {
+impl ListeningSockets for Opened {
     fn binding(&self) -> Option<u32> {
         let state = self.state();
         let is_bound = match &*state {

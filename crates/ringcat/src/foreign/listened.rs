@@ -13,8 +13,8 @@ const SPREAD: Duration = Duration::from_millis(250);
 /// Interval of looks of a thread that waits.
 const LOOK: Duration = Duration::from_millis(1);
 
-/// The sockets of links that listen.
-pub trait Ears: fmt::Debug + Send + Sync {
+/// The sockets with which a segment is listened to.
+pub trait ListeningSockets: fmt::Debug + Send + Sync {
     /// The number of times that they were bound to an interface; `None` while one is not bound to an interface that is
     /// there, and hears nothing.
     fn binding(&self) -> Option<u32>;

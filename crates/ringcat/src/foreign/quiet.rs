@@ -10,7 +10,7 @@ use ringcat_engine::time::Instant;
 use ringcat_link::WakeUp;
 use ringcat_wire::frame::MacAddress;
 
-use super::{Ears, Heard, LAST_FRAMES, Listened, ListenedPhase, has_commands};
+use super::{Heard, LAST_FRAMES, Listened, ListenedPhase, ListeningSockets, has_commands};
 use crate::links::{Links, PerLink};
 use crate::text::address_of_sender;
 
@@ -34,15 +34,15 @@ pub struct QuietLinks<L> {
 struct Quiet<L> {
     /// Frames of another MainDevice may also arrive there.
     other_half: L,
-    ear: Ear,
+    silence: Silence,
 }
 
-/// What was heard until now.
+/// The silence on the links until now.
 #[derive(Debug)]
-struct Ear {
+struct Silence {
     listened: Arc<Listened>,
-    ears: Arc<dyn Ears>,
-    /// What the ears were when the silence began.
+    sockets: Arc<dyn ListeningSockets>,
+    /// How they were bound when the silence began.
     binding: Option<u32>,
     /// The carriers, and since when they are so.
     carriers: [bool; 2],
@@ -54,44 +54,45 @@ struct Ear {
 impl<L: Links> QuietLinks<L> {
     /// Links of an acyclic half. They listen with those of the cyclic half too, unless the segment is free already.
     /// Nothing may have been sent on any of them.
-    pub fn new(acyclic: L, cyclic: L, listened: Arc<Listened>, ears: Arc<dyn Ears>) -> QuietLinks<L> {
+    pub fn new(acyclic: L, cyclic: L, listened: Arc<Listened>, sockets: Arc<dyn ListeningSockets>) -> QuietLinks<L> {
         let now = acyclic.now();
-        let binding = ears.binding();
+        let binding = sockets.binding();
         let (carriers, carriers_since) = ([false; 2], [now; 2]);
-        let ear = Ear { listened, ears, binding, carriers, carriers_since, silent_since: now };
-        let is_free = ear.listened.phase() == ListenedPhase::Free;
-        let mut links = QuietLinks { links: acyclic, quiet: (!is_free).then_some(Quiet { other_half: cyclic, ear }) };
+        let silence = Silence { listened, sockets, binding, carriers, carriers_since, silent_since: now };
+        let is_free = silence.listened.phase() == ListenedPhase::Free;
+        let mut links =
+            QuietLinks { links: acyclic, quiet: (!is_free).then_some(Quiet { other_half: cyclic, silence }) };
         links.look();
         links
     }
 
     /// Takes frames of others, and ends the silence when it has lasted long enough.
     fn look(&mut self) {
-        let QuietLinks { links, quiet: Some(Quiet { other_half, ear }) } = self else { return };
+        let QuietLinks { links, quiet: Some(Quiet { other_half, silence }) } = self else { return };
         let now = links.now();
-        ear.follow_carriers(now, Link::ALL.map(|link| has_carrier(links, link)));
+        silence.follow_carriers(now, Link::ALL.map(|link| has_carrier(links, link)));
         for links in [&mut *links, other_half] {
             for _ in 0..FRAMES {
-                if !links.receive(&mut |link, frame| ear.take(now, link, frame)) {
+                if !links.receive(&mut |link, frame| silence.take(now, link, frame)) {
                     break;
                 }
             }
         }
-        if ear.is_over(now) {
-            ear.listened.set(ListenedPhase::Free);
+        if silence.is_over(now) {
+            silence.listened.set(ListenedPhase::Free);
             self.quiet = None;
         }
     }
 
     /// The end of a wait: while it is listened, the next look.
     fn end_of(&self, now: Instant, until: Instant) -> Instant {
-        let Some(Quiet { ear, .. }) = &self.quiet else { return until };
-        let is_listening = ear.listened.phase() == ListenedPhase::Listening;
+        let Some(Quiet { silence, .. }) = &self.quiet else { return until };
+        let is_listening = silence.listened.phase() == ListenedPhase::Listening;
         until.min(now + if is_listening { LOOK } else { LONG_LOOK })
     }
 }
 
-impl Ear {
+impl Silence {
     fn follow_carriers(&mut self, now: Instant, carriers: [bool; 2]) {
         for link in Link::ALL.map(Link::index) {
             if carriers[link] != self.carriers[link] {
@@ -118,12 +119,12 @@ impl Ear {
         }
     }
 
-    /// Whether nothing was heard for long enough, with the same ears all the time.
+    /// Whether nothing was heard for long enough, with the same sockets all the time.
     fn is_over(&mut self, now: Instant) -> bool {
         if !self.carriers.contains(&true) || now.since(self.silent_since) < self.listened.lasts() {
             return false;
         }
-        let binding = self.ears.binding();
+        let binding = self.sockets.binding();
         let has_heard = binding.is_some() && binding == self.binding;
         if !has_heard {
             (self.binding, self.silent_since) = (binding, now);
@@ -270,7 +271,7 @@ mod tests {
     #[derive(Debug, Default)]
     struct Sockets(AtomicU32);
 
-    impl Ears for Sockets {
+    impl ListeningSockets for Sockets {
         fn binding(&self) -> Option<u32> {
             Some(self.0.load(Ordering::Relaxed)).filter(|binding| *binding != DEAF)
         }
