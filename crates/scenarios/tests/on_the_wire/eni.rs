@@ -1,4 +1,5 @@
-//! An ENI on interfaces: `ringcat sim --eni` simulates the segment, `ringcat run --eni` brings it to OP (protocol 8).
+//! An ENI and a network file on interfaces: `ringcat sim` simulates the segment of the file, `ringcat run` brings it to
+//! OP (protocol 8).
 
 use std::path::Path;
 
@@ -25,6 +26,28 @@ fn an_eni_with_lrw_runs_on_a_ring_of_interfaces_only_if_split() {
     let (output, errors) = said(&bench.ringcat(&[&run[..], &more[..]].concat()));
     for words in ["all SubDevices are in OP", "Drive.Position = -1234", "stopped: outputs zero, all SubDevices in INIT"]
     {
+        assert!(output.contains(words), "{words}: {output}{errors}");
+    }
+}
+
+/// The file is that of a scan of another simulated segment.
+// covers: network-file
+#[test]
+fn the_simulated_segment_of_a_network_file_runs_with_the_file() {
+    let Some(mut bench) = Bench::new(2) else { return };
+    let place = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let (segment, network) = (place.join("of-network.segment.toml"), place.join("of-network.toml"));
+    let devices = ["coupler", "digital-output-8", "servo"].map(|kind| format!("[[device]]\ntype = \"{kind}\"\n"));
+    std::fs::write(&segment, format!("[segment]\nring = true\n{}", devices.concat())).expect("a file");
+    let path = network.to_str().expect("its name is text");
+    let init = ["init", "--sim", segment.to_str().expect("its name is text"), "--out", path, "--overwrite"];
+    let (output, errors) = said(&bench.ringcat(&init));
+    assert!(output.contains("result: ok: 3 SubDevices"), "{output}{errors}");
+    bench.simulate_file("--network", &network, true);
+    let run = ["run", "--main", "main0", "--redundant", "main1", "--network", path, "--for", "200ms"];
+    let values = ["--set", "servo.Command.Target velocity=77", "--watch", "servo.Feedback.Velocity"];
+    let (output, errors) = said(&bench.ringcat(&[&run[..], &values[..]].concat()));
+    for words in ["all SubDevices are in OP", "servo.Feedback.Velocity = 77", "all SubDevices in INIT"] {
         assert!(output.contains(words), "{words}: {output}{errors}");
     }
 }
