@@ -13,7 +13,7 @@ use super::breaks::Breaks;
 use super::cabling::Cabling;
 use super::changes::{Changes, Compared};
 use super::choices::Choices;
-use super::clocks::Clocks;
+use super::clocks::{ClockVersions, Clocks};
 use super::crossings::{Crossings, LineCheck};
 use super::disturbance::{Disturbance, Slot};
 use super::hot_connect::HotConnect;
@@ -291,6 +291,17 @@ impl Segment {
         }
     }
 
+    /// The version of the clocks, for a procedure that starts now.
+    pub fn clock_versions(&self) -> ClockVersions {
+        let (isolations, holds) = (self.slot.isolations(), self.board.clocks.holds());
+        ClockVersions { changes: self.clocks.changes, isolations, holds }
+    }
+
+    /// Whether no SubDevice was out of reach on purpose since this number of isolations.
+    pub(super) fn was_all_in_reach(&self, isolations: u32) -> bool {
+        self.slot.running() != Some(Disturbance::IsolateRings) && isolations == self.slot.isolations()
+    }
+
     /// Whether station addresses are those of this version.
     pub(super) fn are_addresses_as_in(&self, versions: Versions) -> bool {
         versions.addresses == self.addresses.version()
@@ -298,8 +309,7 @@ impl Segment {
 
     /// Whether positions and station addresses that were requested in this version are still those of the segment.
     pub fn are_places_valid(&self, versions: Versions) -> bool {
-        let is_isolating = self.slot.running() == Some(Disturbance::IsolateRings);
-        !is_isolating && versions.isolations == self.slot.isolations() && self.are_addresses_as_in(versions)
+        self.was_all_in_reach(versions.isolations) && self.are_addresses_as_in(versions)
     }
 
     /// Whether enough searches for SubDevices have failed for a test of the number of datagrams per frame.

@@ -142,6 +142,7 @@ impl Segment {
     /// Begins a stage. Nothing of the last declaration remains; findings that were requested before are refused.
     fn begin(&mut self, stage: Stage, mut declared: Declared) {
         declared.cabling.version = self.cabling.version.wrapping_add(1);
+        declared.clocks.changes = self.clocks.changes.of_next();
         let mut addresses = core::mem::take(&mut self.addresses);
         let first_attempt = self.subdevices.next_attempt(self.first_attempt);
         let mut keeping = core::mem::take(&mut self.keeping);
