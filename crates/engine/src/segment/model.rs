@@ -10,6 +10,7 @@ use ringcat_wire::register::DlControl;
 use super::addresses::Addresses;
 use super::attention::{Attention, Round};
 use super::breaks::Breaks;
+use super::cable_watch::CableWatch;
 use super::cabling::Cabling;
 use super::changes::{Changes, Compared};
 use super::choices::Choices;
@@ -102,6 +103,8 @@ pub struct Segment {
     /// What is known of the clocks from a former application or another process.
     pub(super) known_clocks: Option<Rc<KnownClocks>>,
     pub(super) breaks: Breaks,
+    /// Recent errors of the cables of a version of the cabling.
+    pub(super) cable_watches: (u32, Vec<CableWatch>),
     pub(super) local_rings: LocalRings,
     pub(super) silence: Silence,
     pub(super) crossings: Crossings,
@@ -132,6 +135,7 @@ impl Segment {
             compared: Compared::default(),
             ring: Ring::new(ring, carriers),
             breaks: Breaks::default(),
+            cable_watches: (0, Vec::new()),
             local_rings: LocalRings::new(&cabling, &subdevices),
             silence: Silence::default(),
             crossings: Crossings::new(&cabling, &subdevices, choices),

@@ -2,7 +2,6 @@
 
 use alloc::rc::Rc;
 use alloc::string::{String, ToString};
-use alloc::vec::Vec;
 
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
@@ -24,13 +23,6 @@ impl Segment {
             self.subdevices = SubDevices::default();
             self.stage = Stage::Scanning { is_requested };
             (self.idle.compared, self.idle.counted) = (Comparison::Open, None);
-        }
-    }
-
-    /// What the scan under way has found.
-    pub(in crate::segment) fn report_findings(&self, findings: Vec<Event>, effects: &mut Effects) {
-        if self.is_scanning() {
-            findings.into_iter().for_each(|event| effects.report(event));
         }
     }
 
