@@ -314,7 +314,7 @@ pub(super) fn report_oddities(segment: &SharedSegment, subdevices: &SubDevices, 
     for (subdevice, member) in subdevices.members().enumerate() {
         let warnings = member.setup.iter().flat_map(|setup| &setup.plan.warnings);
         for warning in warnings {
-            report(subdevice, Oddity::Plan(warning.clone()));
+            report(subdevice, Oddity::Plan(*warning));
         }
         if let Some((period, watchdog)) = beyond_watchdog(subdevice, &member, layout) {
             report(subdevice, Oddity::Watchdog { period, watchdog });

@@ -366,8 +366,9 @@ pub enum Observation<'a> {
     /// Port commands to this SubDevice are stored from now on.
     PortsFollowed(StationAddress),
     /// Ports of these SubDevices are about to be changed for a moment; with their settings before. None: they are
-    /// restored, or expire. It is no finding that may be outdated: only the disturbance under way alters ports, and what
-    /// the application orders since the settings were read is counted ([`Observation::PortsOrdered`]) and restored.
+    /// restored, or expire. It is no finding that may be outdated: only the disturbance under way alters ports, and
+    /// what the application orders since the settings were read is counted ([`Observation::PortsOrdered`]) and
+    /// restored.
     PortsAltered(&'a [(StationAddress, DlControl)]),
     /// A port command to a SubDevice whose commands are stored is about to be sent.
     PortsOrdered {

@@ -167,6 +167,13 @@ impl Clocks {
         if let Life::Running(running) = &mut self.life { Some(running) } else { None }
     }
 
+    /// The static drift compensation has ended.
+    pub(in crate::segment) fn end_compensation(&mut self) {
+        if let Some(running) = self.running_mut() {
+            running.compensation = Compensation::Idle;
+        }
+    }
+
     pub(in crate::segment) fn is_compensating(&self) -> bool {
         self.running().is_some_and(|running| running.compensation == Compensation::Running)
     }

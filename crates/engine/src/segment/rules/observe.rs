@@ -16,8 +16,8 @@ use crate::segment::versions::Versions;
 use crate::segment::wake::Wake;
 use crate::time::Instant;
 
-/// Pause between two tests of the number of datagrams per frame. Long frames delay a cycle, so there is a pause whatever
-/// else disturbs the segment.
+/// Pause between two tests of the number of datagrams per frame. Long frames delay a cycle, so there is a pause
+/// whatever else disturbs the segment.
 const FRAME_TESTS: Duration = Duration::from_secs(10);
 
 impl Segment {

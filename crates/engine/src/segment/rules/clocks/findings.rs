@@ -15,7 +15,7 @@ use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::link::Link;
 use crate::segment::clocks::{
-    ClockFinding, ClockKey, ClockVersions, Compensation, Delays, Due, LatchedTimes, Life, Running, Unwritten,
+    ClockFinding, ClockKey, ClockVersions, Delays, Due, LatchedTimes, Life, Running, Unwritten,
 };
 use crate::segment::effect::Effects;
 use crate::segment::model::Segment;
@@ -63,32 +63,42 @@ impl Segment {
                 self.follow_links(answers, is_explained, versions.holds, now, effects);
             }
             DelaysWritten(link) => self.observe_written(link, versions),
-            DelaysNotWritten(reason) if self.are_delays_as_in(versions) => {
-                effects.report(Event::ClocksFailed { reason });
-            }
-            DelaysNotWritten(_) => {}
+            DelaysNotWritten(reason) => self.observe_not_written(reason, versions, effects),
             MeasurementEnded { failed } => self.observe_end_of_measurement(failed, versions, now, effects),
             Followed if self.are_delays_as_in(versions) => self.follow(versions.holds),
             Followed => {}
             FiltersWritten(filters) => self.observe_filters(filters, versions),
 
             NotLocked { member, attempt, reason, is_hidden } => {
-                let is_current = self.member(member).is_some_and(|it| it.attempt == attempt);
-                if is_current && self.clocks.goes_on_unlocked(is_hidden) {
-                    effects.report(Event::WentOnUnlocked { subdevice: SubDeviceId(member), reason });
-                }
+                self.observe_not_locked((member, attempt), reason, is_hidden, effects);
             }
             OffsetRead { key, written_ns, read } => self.observe_read_offset(key, (written_ns, read), now),
             LatchedFor { key, latched, host } => self.observe_latched_for(key, latched, host),
             OneSetUp(key) => self.observe_one_set_up(key, versions),
-            Compensated => {
-                if let Some(running) = self.clocks.running_mut() {
-                    running.compensation = Compensation::Idle;
-                }
-            }
+            Compensated => self.clocks.end_compensation(),
             OffsetsWritten { missed } => self.observe_written_offsets(missed, versions, effects),
             SteppedBack { missed } => self.observe_stepped_back(missed),
             ReferenceTime { key, low, sent_at } => self.observe_reference_time((key, low, sent_at), versions, effects),
+        }
+    }
+
+    /// A member needs clocks that are not locked. It is refused if the member was lost since.
+    fn observe_not_locked(
+        &self,
+        (member, attempt): (usize, u32),
+        reason: String,
+        is_hidden: bool,
+        effects: &mut Effects,
+    ) {
+        let is_current = self.member(member).is_some_and(|it| it.attempt == attempt);
+        if is_current && self.clocks.goes_on_unlocked(is_hidden) {
+            effects.report(Event::WentOnUnlocked { subdevice: SubDeviceId(member), reason });
+        }
+    }
+
+    fn observe_not_written(&self, reason: String, versions: &ClockVersions, effects: &mut Effects) {
+        if self.are_delays_as_in(versions) {
+            effects.report(Event::ClocksFailed { reason });
         }
     }
 

@@ -278,7 +278,7 @@ fn a_clock_that_missed_an_offset_and_lost_its_registers_is_set_up_once() {
 
 // covers: dc-reference
 #[test]
-fn the_time_of_a_former_reference_or_from_before_a_jump_is_not_the_time_of_the_segment() {
+fn the_time_of_a_former_reference_or_from_before_a_step_does_not_count() {
     let changes: [fn(&mut Ring); 2] = [
         |ring| {
             ring.loses_registers(0);
