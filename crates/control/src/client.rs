@@ -16,9 +16,9 @@ use crate::wire::{Limits, WireError};
 
 /// The daemon answers to a greeting within this time.
 const GREETING: Duration = Duration::from_secs(5);
-/// Wait for an answer beyond the time that the question may take.
+/// Wait for an answer beyond the time that the query may take.
 const BEYOND: Duration = Duration::from_secs(30);
-/// A question waits so long while the master passes from one process to another.
+/// A query waits so long while the master passes from one process to another.
 const CHANGE: Duration = Duration::from_secs(5);
 /// Interval of tries meanwhile.
 const PAUSE: Duration = Duration::from_millis(5);
@@ -156,8 +156,8 @@ impl Client {
         }
     }
 
-    /// As [`Client::ask`]. While the master passes from one process to another, or its owner has as many questions as
-    /// it may have, it is asked again, for up to 5 s.
+    /// As [`Client::ask`]. While the master passes from one process to another, or its owner has as many queries as
+    /// it may have, the query is repeated, for up to 5 s.
     ///
     /// # Errors
     /// As [`Client::ask`].
@@ -175,8 +175,8 @@ impl Client {
         }
     }
 
-    /// Whether the daemon has neither ended the connection nor said anything that was not asked for: between two
-    /// questions it says nothing but why it ends the connection.
+    /// Whether the daemon has neither ended the connection nor sent a message without a query: between two queries it
+    /// sends nothing but why it ends the connection.
     pub fn is_open(&self) -> bool {
         wait_readable(&[self.connection.as_fd()], Duration::ZERO) == 0
     }

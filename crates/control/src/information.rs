@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// What a broadcast shows of all SubDevices now.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct SegmentOverview {
     /// SubDevices that processed the copy on the main link, and on the redundant link.
     pub counts: [u16; 2],

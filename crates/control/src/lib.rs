@@ -1,17 +1,17 @@
 //! Messages between the daemon `ringcatd`, the application that drives a segment (its owner), and clients.
 //!
-//! * [`message`]: what they say;
-//! * [`information`]: what is seen of a segment now;
-//! * [`tool`]: what is known of a master, its SubDevices and its application;
-//! * [`refusal`]: why something is not done, in one sentence;
+//! * [`message`]: their contents;
+//! * [`information`]: the present state of a segment;
+//! * [`tool`]: data of a master, its SubDevices and its application;
+//! * [`refusal`]: why a request is refused, in one sentence;
 //! * [`wire`]: messages as bytes, and any bytes as a message or an error;
 //! * [`connection`]: messages and descriptors over a Unix socket;
 //! * [`arriving`]: a message of which a part has arrived;
-//! * [`client`]: questions to a daemon; [`socket`]: where it listens.
+//! * [`client`]: queries to a daemon; [`socket`]: where it listens.
 //!
-//! A client says [`Content::Hello`], then asks. An application that drives a master says [`Content::Take`] and gets the
-//! descriptors of its links with what is known of the segment; from then on the daemon asks on this connection. The
-//! order is in decision 0074.
+//! A client sends [`Content::Hello`], then queries. An application that drives a master sends [`Content::Take`] and
+//! receives the descriptors of its links with the known data of the segment; from then on the daemon sends queries on
+//! this connection. The order is in decision 0074.
 #![forbid(unsafe_code)]
 
 pub mod arriving;

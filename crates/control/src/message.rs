@@ -24,7 +24,7 @@ const _: () = assert!(MOST_INTERFACES + 5 <= ringcat_link::descriptors::MOST);
 /// A message.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Message {
-    /// What it says.
+    /// Its content.
     pub content: Content,
     /// Data: of an object, of registers, of an SII, or knowledge of a segment. Empty where none belongs to it.
     pub bytes: Vec<u8>,
@@ -36,7 +36,7 @@ impl From<Content> for Message {
     }
 }
 
-/// What a message says.
+/// The content of a message.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Content {
@@ -52,11 +52,11 @@ pub enum Content {
         /// Process id of the daemon.
         pid: u32,
     },
-    /// A question: of a client to the daemon, of the daemon to an owner.
+    /// A query: of a client to the daemon, of the daemon to an owner.
     Query(Numbered<Query>),
-    /// An owner has taken a question, and answers when it is done.
+    /// An owner has accepted a query, and answers when it is done.
     Underway {
-        /// Number of the question.
+        /// Number of the query.
         id: u32,
     },
     /// The answer.
@@ -92,7 +92,7 @@ pub enum Content {
         /// Up.
         up: bool,
     },
-    /// An owner tells what it knows after a scan, in the bytes.
+    /// Known data of the segment after a scan, from an owner, in the bytes.
     Knowledge,
     /// An owner gives the master back, and sends nothing any more. The bytes are what it knows; empty if that is
     /// nothing.
@@ -108,12 +108,12 @@ pub enum Content {
     Refused(Refusal),
 }
 
-/// A question or an answer to the question with the same number.
+/// A query, or the answer to the query with the same number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Numbered<T> {
-    /// Number, chosen by the side that asks.
+    /// Number, chosen by the side that sends the query.
     pub id: u32,
-    /// Number of the master; that of a question about all masters is not used.
+    /// Number of the master; that of a query about all masters is not used.
     pub master: u32,
     /// Question or answer.
     pub what: T,
@@ -128,7 +128,7 @@ pub enum Right {
     Change,
 }
 
-/// A question. SubDevices have their positions in the ring, whether an application is active or not.
+/// A query. SubDevices have their positions in the ring, whether an application is active or not.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Query {
@@ -214,7 +214,7 @@ pub enum Query {
         /// The IDN.
         idn: u16,
     },
-    /// What the command line tool asks, and clients that want the same.
+    /// Queries of the command line tool, and of clients that want the same.
     Tool(ToolQuery),
 }
 
@@ -300,6 +300,7 @@ pub enum Answer {
 
 /// A master.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct MasterState {
     /// Its number.
     pub master: u32,
@@ -324,6 +325,7 @@ pub struct EventLine {
 
 /// A master that is handed over. Descriptors follow in this order: those of the links, a lock, network interfaces.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct HandedBus {
     /// Its links.
     pub links: HandedLinks,
@@ -340,6 +342,7 @@ pub struct HandedBus {
 /// The links of a master that is handed over. Descriptors follow in this order: cyclic half main, redundant; acyclic
 /// half main, redundant.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct HandedLinks {
     /// The main link.
     pub main: HandedLink,
@@ -365,7 +368,26 @@ pub enum HandedLink {
     },
 }
 
+impl MasterState {
+    /// A master with these links that the daemon drives.
+    pub const fn new(master: u32, links: String) -> MasterState {
+        MasterState { master, links, owner: None, fault: None }
+    }
+}
+
+impl HandedBus {
+    /// These links and nothing else.
+    pub const fn new(links: HandedLinks) -> HandedBus {
+        HandedBus { links, has_lock: false, interfaces: Vec::new(), can_switch: false, debug_level: 0 }
+    }
+}
+
 impl HandedLinks {
+    /// One link, or two.
+    pub const fn new(main: HandedLink, redundant: Option<HandedLink>) -> HandedLinks {
+        HandedLinks { main, redundant }
+    }
+
     /// Number of descriptors that come with it.
     pub fn descriptors(&self) -> usize {
         if self.redundant.is_some() { 4 } else { 2 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub struct Owner {
     /// Its process id; 0 if it is not known here.
     pub pid: u32,
-    /// Its name as it said it.
+    /// Its name, from its first message.
     pub program: String,
 }
 

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::owner::Owner;
 
-/// Why a question has no answer, or a connection ends.
+/// Why a query has no answer, or a connection ends.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum Refusal {
@@ -21,7 +21,7 @@ pub enum Refusal {
     ReadOnly,
     /// There is no such master.
     NoMaster {
-        /// The number asked for.
+        /// The requested number.
         master: u32,
         /// Those that are there.
         present: Vec<u32>,

@@ -21,10 +21,10 @@ pub const MOST_DECLARED: usize = 64;
 pub const MOST_PART: usize = 48 << 10;
 /// Most bytes of a file that is read or written.
 pub const MOST_FILE: usize = 16 << 20;
-/// Most bytes of a start-up command that are told; its length is that of all of them.
+/// Most bytes of a start-up command that are sent; its length is that of all of them.
 pub const MOST_STARTUP: usize = 1024;
 
-/// A question of the tool.
+/// A query of the tool.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum ToolQuery {
@@ -146,7 +146,7 @@ pub enum ToolQuery {
 }
 
 impl ToolQuery {
-    /// Whether the answer only tells what is so.
+    /// Whether the answer only shows the present state.
     pub fn is_reading(&self) -> bool {
         !matches!(
             self,
@@ -167,7 +167,7 @@ impl ToolQuery {
     }
 }
 
-/// An answer to a question of the tool.
+/// An answer to a query of the tool.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum ToolAnswer {

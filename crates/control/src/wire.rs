@@ -16,8 +16,9 @@ pub const VERSION: u16 = 5;
 pub const HEADER: usize = 16;
 const MAGIC: [u8; 4] = *b"RCTL";
 
-/// Longest parts of a message that are taken.
+/// Longest parts of a message that are accepted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Limits {
     /// Of the content, in bytes.
     pub content: usize,
@@ -56,7 +57,7 @@ pub enum WireError {
 }
 
 impl WireError {
-    /// The refusal with which the other side is told.
+    /// The refusal that the other side receives.
     pub fn refusal(&self) -> Refusal {
         match self {
             WireError::Version { there } => Refusal::Version { here: VERSION, there: *there },

@@ -43,8 +43,8 @@ const MASTER: u32 = 0;
 const LONGEST_DIRECTORY: usize = 64;
 /// Longest name of an interface.
 const LONGEST_NAME: usize = 15;
-/// What the daemon has said last is waited for so long, and so much of it is kept.
-const LAST_WORDS: Duration = Duration::from_millis(500);
+/// Wait for the standard error of a daemon that has ended.
+const READ_LIMIT: Duration = Duration::from_millis(500);
 const MOST_WORDS: usize = 4096;
 
 /// The daemon of one command.
@@ -52,7 +52,7 @@ const MOST_WORDS: usize = 4096;
 pub struct Standalone {
     daemon: Child,
     /// What it says before its end.
-    said: Option<JoinHandle<String>>,
+    standard_error: Option<JoinHandle<String>>,
 }
 
 /// The links that the options name, as the option of the daemon; `None` without such an option.
@@ -104,8 +104,8 @@ impl Standalone {
             .spawn();
         let cannot = |error| Failure::failed(format!("'{}' cannot be started: {error}", program().display()));
         let mut daemon = spawned.map_err(cannot)?;
-        let said = listen_to(daemon.stderr.take());
-        let mut standalone = Standalone { daemon, said };
+        let standard_error = listen_to(daemon.stderr.take());
+        let mut standalone = Standalone { daemon, standard_error };
         let mut client = standalone.connect(&socket, begin)?;
         // The connection is enough: nothing is left where the command is ended by a signal.
         drop(directory);
@@ -123,7 +123,7 @@ impl Standalone {
                 Err(error) => return Err(error.into()),
             }
             if let Ok(Some(_)) = self.daemon.try_wait() {
-                return Err(Failure::failed(self.said()));
+                return Err(Failure::failed(self.daemon_errors()));
             }
             if begin.elapsed() >= START {
                 return Err(late("ringcatd does not answer"));
@@ -132,15 +132,15 @@ impl Standalone {
         }
     }
 
-    /// What the daemon has said before its end.
-    fn said(&mut self) -> String {
+    /// The standard error of the daemon, once it has ended.
+    fn daemon_errors(&mut self) -> String {
         let begin = Instant::now();
         // A process that it has started may still have its standard error.
-        while self.said.as_ref().is_some_and(|said| !said.is_finished()) && begin.elapsed() < LAST_WORDS {
+        while self.standard_error.as_ref().is_some_and(|reader| !reader.is_finished()) && begin.elapsed() < READ_LIMIT {
             std::thread::sleep(LOOK);
         }
-        let said = self.said.take().filter(JoinHandle::is_finished);
-        let text = said.and_then(|said| said.join().ok()).unwrap_or_default();
+        let reader = self.standard_error.take().filter(JoinHandle::is_finished);
+        let text = reader.and_then(|reader| reader.join().ok()).unwrap_or_default();
         match text.trim_end() {
             "" => "ringcatd has ended".to_owned(),
             text => text.to_owned(),
@@ -225,7 +225,7 @@ fn activity(client: &mut Client) -> Result<Activity, Failure> {
     }
 }
 
-/// What the last failed scan has said.
+/// The error of the last failed scan.
 fn why_no_scan(client: &mut Client) -> Result<String, Failure> {
     let (mut from, mut last) = (0, None);
     loop {

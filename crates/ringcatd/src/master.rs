@@ -172,7 +172,9 @@ impl Master {
             Driver::Daemon(..) => (None, self.others.cause()),
             Driver::Changing => (None, None),
         };
-        MasterState { master: self.number, links: self.links.clone(), owner, fault }
+        let mut state = MasterState::new(self.number, self.links.clone());
+        (state.owner, state.fault) = (owner, fault);
+        state
     }
 
     /// Waits until it is known whether another MainDevice drives the segment, if a link has a carrier.
@@ -256,13 +258,11 @@ impl Master {
         };
         let mut lock = locked(&self.lock);
         lock.iter_mut().for_each(|lock| lock.note(owner.owner()));
-        let handed = HandedBus {
-            links: opened.links().clone(),
-            has_lock: lock.is_some(),
-            interfaces: interfaces.iter().map(|(name, _)| name.clone()).collect(),
-            can_switch: opened.can_switch(),
-            debug_level: self.debug_level.load(Ordering::Acquire),
-        };
+        let mut handed = HandedBus::new(opened.links().clone());
+        handed.has_lock = lock.is_some();
+        handed.interfaces = interfaces.iter().map(|(name, _)| name.clone()).collect();
+        handed.can_switch = opened.can_switch();
+        handed.debug_level = self.debug_level.load(Ordering::Acquire);
         let mut raw: Vec<_> = opened.descriptors().iter().map(AsRawFd::as_raw_fd).collect();
         raw.extend(lock.iter().map(OwnerLock::descriptor));
         raw.extend(interfaces.iter().map(|(_, descriptor)| descriptor.as_raw_fd()));

@@ -82,7 +82,7 @@ impl Opened {
         }
         let mut links = links.into_iter();
         let main = links.next().ok_or_else(|| "a master has no link".to_owned())?;
-        let links = HandedLinks { main, redundant: links.next() };
+        let links = HandedLinks::new(main, links.next());
         let state = Mutex::new(State::Interfaces(followed));
         Ok(Opened { links, descriptors: sockets, state, bindings: AtomicU32::new(0) })
     }

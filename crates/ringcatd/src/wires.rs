@@ -136,7 +136,7 @@ impl Wires {
                 sent.map_err(|error| format!("the process of the simulated segment: {error}"))?;
                 let half = |(main, redundant): (OwnedFd, Option<OwnedFd>)| [Some(main), redundant];
                 let all = [half(near.cyclic), half(near.acyclic)];
-                let links = HandedLinks { main: HandedLink::Pipe, redundant: is_ring.then_some(HandedLink::Pipe) };
+                let links = HandedLinks::new(HandedLink::Pipe, is_ring.then_some(HandedLink::Pipe));
                 Ok(Opened::pipes(links, all.into_iter().flatten().flatten().collect()))
             }
             Wires::Interfaces(interfaces) => interfaces.open(),

@@ -5,6 +5,9 @@
 //! type by name; in all of these crates also for each public type with such a name as `Error`. A newtype is its value.
 //! `EXEMPT` lists the types that are closed, with the reason.
 //!
+//! The lines of the tool (`daemon::known`, a module) are made by the library and printed by `ethercat` of the same
+//! version: messages of another version are refused (decision 0105), and a new key must be printed, not overlooked.
+//!
 //! Of `wire`, `sim` and `config`, which are re-exported as a whole, only types with such names: the others change with
 //! the protocol, with what is simulated, and with the format of the file.
 
@@ -15,7 +18,7 @@ use crate::tree::{File, Tree};
 /// Crates whose public types are all meant for applications.
 const OWN: [&str; 2] = ["ringcat", "gateway"];
 /// Crates with types that the library re-exports by name.
-const LOWER: [&str; 3] = ["engine", "config", "link"];
+const LOWER: [&str; 4] = ["engine", "config", "link", "control"];
 /// Crates of which only types with such [`NAMES`] are meant.
 const BY_NAME: [&str; 2] = ["sim", "wire"];
 
@@ -44,6 +47,7 @@ const EXEMPT: &[(&str, &str)] = &[
     ("PayloadError", "a server answers each with a code of its own"),
     ("RegisterAccess", "a register is written or checked"),
     ("RequestState", "a request of the cyclic thread is polled: an application has to handle each"),
+    ("Right", "to read, or to change: a server decides about each"),
     ("RingState", "closed, open, or not yet proved"),
     ("SdoAddress", "index and subindex"),
     ("SoeAddress", "drive and IDN"),

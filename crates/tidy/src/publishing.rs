@@ -61,6 +61,11 @@ fn of_package(tree: &Tree, path: &str, package: &Table) -> Vec<String> {
     if !list("keywords").iter().all(is_keyword) {
         faults.push(format!("a keyword has 1 to {KEYWORD} characters"));
     }
+    let settings = package.get("metadata").and_then(|it| it.get("docs")?.get("rs"));
+    let has_targets = settings.and_then(|it| it.get("targets")).and_then(Value::as_array).is_some();
+    if tree.file(&path.replace("Cargo.toml", "src/lib.rs")).is_some() && !has_targets {
+        faults.push("a library has `targets` in `[package.metadata.docs.rs]`".to_owned());
+    }
     faults
 }
 
@@ -95,5 +100,17 @@ mod tests {
         assert_eq!(findings(good, &FIT.replace("description", "name")), 1);
         assert_eq!(findings(good, &FIT.replace("[\"k\"]", "[\"a\", \"b\", \"c\", \"d\", \"e\", \"f\"]")), 1);
         assert_eq!(findings(good, &FIT.replace("\"k\"", "\"a-keyword-that-is-too-long\"")), 1);
+    }
+
+    #[test]
+    fn a_published_library_says_for_which_targets_it_is_documented() {
+        let documented = format!("{FIT}[package.metadata.docs.rs]\ntargets = [\"x86_64-unknown-linux-gnu\"]\n");
+        for (manifest, faults) in [(FIT, 1), (documented.as_str(), 0)] {
+            let files = [("crates/a/README.md", "# a\n"), ("crates/a/src/lib.rs", "//! A.\n")];
+            let tree = Tree { files: files.map(|(path, text)| File::new(path, text)).to_vec() };
+            let package: Table = manifest.parse().expect("it is TOML");
+            let package = package["package"].as_table().expect("a table");
+            assert_eq!(of_package(&tree, "crates/a/Cargo.toml", package).len(), faults, "{manifest}");
+        }
     }
 }

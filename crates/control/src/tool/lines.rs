@@ -102,7 +102,7 @@ pub struct Description {
     pub mailbox: Option<[(u16, u16); 2]>,
     /// Mailbox protocols, as in word 0x1C of the SII.
     pub protocols: u16,
-    /// Whether the SII has a general category that tells anything.
+    /// Whether the SII has a general category with data.
     pub has_general: bool,
     /// Group.
     pub group: String,

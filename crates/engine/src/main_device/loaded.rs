@@ -9,11 +9,11 @@ use ringcat_wire::register::PortKind;
 use super::activate_error::ActivateError;
 use super::declaration::Declaration;
 use crate::declared::SubDeviceId;
-use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionError, JunctionMode, START_PORT};
 use crate::procedures::scan::{Scan, cabling_findings, node_status};
 use crate::procedures::shared_segment::SharedSegment;
+use crate::segment::findings::{DeclarationFinding, Oddity};
 use crate::segment::{Found, Observation, SubDevices};
 use crate::supervisor::Bus;
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
@@ -45,8 +45,8 @@ impl Loaded {
             match closing(connection, found).map_err(ActivateError::Junction)? {
                 Ok(closing) => closings.push(closing),
                 Err(subdevice) => {
-                    let what = alloc::format!("not there: its {connection} is not watched until a rescan finds it");
-                    segment.observe(Observation::Compared(Event::PlanOddity { subdevice, what }));
+                    let oddity = Oddity::AbsentEnd(*connection);
+                    segment.observe(Observation::Compared(DeclarationFinding::Oddity(subdevice, oddity)));
                 }
             }
         }
@@ -55,8 +55,8 @@ impl Loaded {
         if mode == JunctionMode::Strict {
             // The scan has not reported it.
             let scan = Scan { topology: topology.clone(), ..scan.scan() };
-            let findings = cabling_findings(bus, &scan, false);
-            findings.into_iter().for_each(|event| segment.observe(Observation::Compared(event)));
+            let finding = DeclarationFinding::Cabling(cabling_findings(bus, &scan, false));
+            segment.observe(Observation::Compared(finding));
         }
         Ok(topology)
     }

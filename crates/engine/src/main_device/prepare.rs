@@ -1,10 +1,7 @@
 //! Compares the declaration with the scan, and builds domains and members from it.
 
-use alloc::borrow::ToOwned;
 use alloc::collections::BTreeSet;
-use alloc::format;
 use alloc::rc::Rc;
-use alloc::string::{String, ToString};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -22,7 +19,6 @@ use super::registered_area::RegisteredArea;
 use crate::config::{ConfigError, Resolution, SubDeviceConfig, can_be_head, groups, resolve};
 use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
-use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::layout::{AreaSpec, DomainSpec, ImageOrder, Layout, LrwPolicy, Witness};
 use crate::link::LinkSet;
@@ -30,6 +26,7 @@ use crate::plan::{PlanError, PlanFault, PlanProblem, SubDevicePlan, plan};
 use crate::procedures::request_state::exchanges;
 use crate::procedures::scan::station_at;
 use crate::procedures::shared_segment::SharedSegment;
+use crate::segment::findings::{DeclarationFinding, Oddity};
 use crate::segment::member::MemberView;
 use crate::segment::setup::{Setup, SetupError, declared_areas, planned_areas, presence};
 use crate::segment::{Found, Observation, Owners, SubDevice, SubDevices};
@@ -71,7 +68,7 @@ pub(super) fn match_declaration(
     let unassigned = extra.into_iter().map(|at| {
         let info = scan.subdevices[at].clone();
         let (position, identity) = (info.position, info.identity);
-        segment.observe(Observation::Compared(Event::Unexpected { position, identity }));
+        segment.observe(Observation::Compared(DeclarationFinding::Unexpected { position, identity }));
         SubDevice::undeclared(info, &owners, scan.main_count)
     });
     Ok((found, unassigned.collect()))
@@ -91,16 +88,9 @@ pub(super) fn check_clocks(
     Ok(())
 }
 
-fn report_absence(segment: &SharedSegment, subdevice: usize, optional: bool, error: ConfigError) {
-    let shown = match error {
-        ConfigError::Mismatch { position, field, expected, got } => {
-            Event::Mismatch { subdevice: SubDeviceId(subdevice), position, field, expected, got }
-        }
-        ConfigError::Missing { .. } | ConfigError::Ambiguous { .. } | ConfigError::DeclaredTwice { .. } => {
-            Event::Missing { subdevice: SubDeviceId(subdevice), optional }
-        }
-    };
-    segment.observe(Observation::Compared(shown));
+fn report_absence(segment: &SharedSegment, subdevice: usize, is_optional: bool, error: ConfigError) {
+    let finding = DeclarationFinding::Absent { subdevice: SubDeviceId(subdevice), is_optional, error };
+    segment.observe(Observation::Compared(finding));
 }
 
 /// Whether a present SubDevice that does not fit its declaration fails alone, when its configuration begins.
@@ -318,22 +308,19 @@ pub(super) fn with_domain(mut declaration: Declaration) -> Declaration {
 
 /// Reports rules that SubDevices cannot follow, and optional SubDevices for which the process image has no place.
 pub(super) fn report_oddities(segment: &SharedSegment, subdevices: &SubDevices, layout: &Layout) {
-    let oddity = |subdevice: usize, what: String| {
-        segment.observe(Observation::Compared(Event::PlanOddity { subdevice: SubDeviceId(subdevice), what }));
+    let report = |subdevice: usize, oddity: Oddity| {
+        segment.observe(Observation::Compared(DeclarationFinding::Oddity(SubDeviceId(subdevice), oddity)));
     };
     for (subdevice, member) in subdevices.members().enumerate() {
         let warnings = member.setup.iter().flat_map(|setup| &setup.plan.warnings);
         for warning in warnings {
-            oddity(subdevice, warning.to_string());
+            report(subdevice, Oddity::Plan(*warning));
         }
         if let Some((period, watchdog)) = beyond_watchdog(subdevice, &member, layout) {
-            let (period, watchdog) = (period.as_millis(), watchdog.as_millis());
-            let what = format!("its outputs come every {period} ms, its watchdog expires after {watchdog} ms");
-            oddity(subdevice, what);
+            report(subdevice, Oddity::Watchdog { period, watchdog });
         }
         if member.info.is_none() && declared_areas(&member.config).is_none() {
-            let what = "not there, and its PDOs are not declared: when it comes, it has no place in the process image";
-            oddity(subdevice, what.to_owned());
+            report(subdevice, Oddity::NoPlace);
         }
     }
 }

@@ -240,7 +240,8 @@ impl BringUp<'_> {
         clocks::restore(self.bus, self.segment, self.index).await?;
         let limit = self.config.limit(AlState::PreOp, AlState::SafeOp);
         if let Some(signals) = &self.config.sync {
-            clocks::start_signals(self.bus, self.segment, self.index, self.station, signals, limit).await?;
+            let member = (self.index, self.attempt);
+            clocks::start_signals(self.bus, self.segment, member, self.station, signals, limit).await?;
         }
         Ok(())
     }
@@ -249,7 +250,8 @@ impl BringUp<'_> {
     pub(super) async fn op(&self) -> Result<(), ConfigureError> {
         self.command(Transition::So).await?;
         if self.config.sync.is_some() {
-            clocks::wait_for_lock(self.bus, self.segment, self.index).await.map_err(ConfigureError::NotLocked)?;
+            let member = (self.index, self.attempt);
+            clocks::wait_for_lock(self.bus, self.segment, member).await.map_err(ConfigureError::NotLocked)?;
         }
         for area in self.setup.plan.process_data.iter().filter(|area| area.op_only) {
             self.write_sync_manager(area.sync_manager, &area.register).await?;

@@ -1,7 +1,5 @@
-//! Reads the error counters of all ports in the background, and reports cables whose errors rise.
-//!
-//! Once a second, a few SubDevices at a time. A cut damages the frame that is on the wire: only many errors at once, or
-//! errors in consecutive seconds, are reported.
+//! Reads the error counters of all ports in the background, once a second, a few SubDevices at a time. The model
+//! decides which rises are reported (`segment::cable_watch`).
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -11,20 +9,14 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::{ErrorCounters, map};
 
 use super::shared_segment::SharedSegment;
-use crate::event::Event;
 use crate::ring_status::{Cable, CableErrors, port_errors};
 use crate::segment::Observation;
 use crate::segment::member::Phase;
 use crate::supervisor::{Bus, BusError};
-use crate::time::Instant;
 use crate::topology::PortOf;
 
 /// Interval of the readings.
 const PAUSE: Duration = Duration::from_secs(1);
-/// Damaged frames between two readings that are reported at once; fewer if there were some at the previous reading too.
-const MANY: u64 = 3;
-/// Minimum time between two reports of the same cable.
-const AGAIN: Duration = Duration::from_secs(10);
 /// Counters saturate at 255: from this value on they are cleared.
 const FULL: u8 = 128;
 
@@ -60,11 +52,8 @@ pub(super) async fn watch_errors(bus: Bus, segment: SharedSegment) {
         if segment.view().versions().cabling != versions.cabling {
             continue;
         }
-        let now = bus.now();
-        let (fresh, events): (Vec<CableErrors>, Vec<Option<Event>>) =
-            watched.iter_mut().map(|watched| watched.close(now)).unzip();
-        let rising = events.into_iter().flatten().collect();
-        segment.observe(Observation::CableErrors { versions, fresh: &fresh, rising });
+        let fresh: Vec<CableErrors> = watched.iter_mut().map(|it| core::mem::take(&mut it.fresh)).collect();
+        segment.observe(Observation::CableErrors { versions, fresh: &fresh });
     }
 }
 
@@ -110,22 +99,15 @@ async fn clear(bus: &Bus, segment: &SharedSegment, index: usize) -> Result<(), B
     Ok(())
 }
 
-/// A cable and the recent errors at its ends.
+/// A cable and the errors at its ends since the last reading.
 struct Watched {
     cable: Cable,
-    /// Since the last reading.
     fresh: CableErrors,
-    /// Since its last report.
-    unreported: CableErrors,
-    /// There were damaged frames at the previous reading too.
-    continues: bool,
-    reported_at: Option<Instant>,
 }
 
 impl Watched {
     fn new(cable: Cable) -> Watched {
-        let (fresh, unreported) = Default::default();
-        Watched { cable, fresh, unreported, continues: false, reported_at: None }
+        Watched { cable, fresh: CableErrors::default() }
     }
 
     /// Adds the counters of a SubDevice, if it is at one of the ends.
@@ -135,21 +117,6 @@ impl Watched {
             let before = before.map(|counters| port_errors(counters, port)).unwrap_or_default();
             self.fresh = self.fresh.plus(rise(before, port_errors(now, port)));
         }
-    }
-
-    /// Ends a reading: returns the new errors, and an event if they are to be reported.
-    fn close(&mut self, now: Instant) -> (CableErrors, Option<Event>) {
-        let fresh = core::mem::take(&mut self.fresh);
-        self.unreported = self.unreported.plus(fresh);
-        let came = fresh.invalid_frames;
-        let is_worth_it = came >= MANY || (came > 0 && self.continues);
-        self.continues = came > 0;
-        if !is_worth_it || self.reported_at.is_some_and(|at| now.since(at) < AGAIN) {
-            return (fresh, None);
-        }
-        self.reported_at = Some(now);
-        let errors = core::mem::take(&mut self.unreported);
-        (fresh, Some(Event::CableErrors { cable: self.cable, errors }))
     }
 }
 
@@ -176,26 +143,20 @@ mod tests {
 
     // covers: cable-errors
     #[test]
-    fn one_damaged_frame_is_not_reported_but_many_or_repeated_ones_are() {
+    fn errors_at_both_ends_count_for_a_cable_also_after_the_counters_were_cleared() {
         let mut watched = Watched::new(CABLE);
-        let mut events = Vec::new();
-        for (second, count) in [0, 1, 1, 2, 3, 3, 9, 250, 2, 2].into_iter().enumerate() {
-            let before = events.len();
-            let last = if second == 0 { 0 } else { [0, 1, 1, 2, 3, 3, 9, 250, 2, 2][second - 1] };
+        let mut rises = Vec::new();
+        let mut last = 0;
+        for count in [0, 1, 1, 2, 3, 3, 9, 250, 2, 2, 100] {
             watched.take(5, Some(&counters(last)), &counters(count));
             watched.take(3, Some(&counters(last)), &counters(count));
-            let (_, event) = watched.close(Instant(0) + Duration::from_secs(second as u64));
-            events.extend(event);
-            assert_eq!(events.len() - before, usize::from(second == 4), "second {second}");
+            rises.push(core::mem::take(&mut watched.fresh).invalid_frames);
+            last = count;
         }
-        let errors = CableErrors { invalid_frames: 3, lost_links: 0 };
-        assert_eq!(events, [Event::CableErrors { cable: CABLE, errors }]);
-        watched.take(5, Some(&counters(0)), &counters(100));
-        let (fresh, event) = watched.close(Instant(0) + Duration::from_secs(14));
-        assert_eq!(fresh.invalid_frames, 100);
-        // 6 and 241 that were counted within ten seconds after the first event, 2 after the counters were cleared, and
-        // these.
-        let errors = CableErrors { invalid_frames: 349, lost_links: 0 };
-        assert_eq!(event, Some(Event::CableErrors { cable: CABLE, errors }));
+        assert_eq!(rises, [0, 1, 0, 1, 1, 0, 6, 241, 2, 0, 98]);
+        let mut at_port_1 = ErrorCounters::default();
+        at_port_1.rx[1].invalid_frames = 4;
+        watched.take(4, None, &at_port_1);
+        assert_eq!(watched.fresh.invalid_frames, 4);
     }
 }

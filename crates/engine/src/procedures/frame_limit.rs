@@ -6,8 +6,6 @@
 //! tested: first with a frame of many reads of one byte, which any SubDevice answers, and then by bisection between a
 //! number that works and one that does not.
 
-use core::time::Duration;
-
 use ringcat_wire::address::Wkc;
 use ringcat_wire::register::map;
 
@@ -20,9 +18,6 @@ use crate::supervisor::{Bus, BusError};
 const MOST: usize = 110;
 /// A frame lost this often in a row is not lost by chance.
 const TRIES: u8 = 3;
-
-/// Pause between two tests in operation.
-const PAUSE: Duration = Duration::from_secs(10);
 
 /// Result of a frame.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -74,15 +69,15 @@ async fn attempt(bus: &Bus, datagrams: usize) -> Outcome {
     Outcome::Lost
 }
 
-/// In operation: reports the limit once, if there is one. Long frames delay a cycle, so the test has a minimum
-/// interval, whatever else disturbs the segment.
+/// In operation: the limit is reported once, if there is one. The model says when another test may begin.
 pub(super) async fn explain(bus: &Bus, segment: &SharedSegment) {
     if bus.now() < segment.view().next_frame_test() {
         return;
     }
     // Set first: the calling procedure may end before the result arrives.
-    segment.observe(Observation::FramesTested(bus.now() + PAUSE));
+    segment.observe(Observation::FramesTested);
+    let versions = segment.view().versions();
     if let Some(limit) = probe(bus).await {
-        segment.observe(Observation::FramesLimited(limit));
+        segment.observe(Observation::FramesLimited { versions, limit });
     }
 }

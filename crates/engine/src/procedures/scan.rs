@@ -47,12 +47,13 @@ use super::services::ServiceError;
 use super::sii::program::SiiProgramError;
 use super::sii::{self, ChainEnd, SiiCache, SiiContents};
 use crate::config::duplicate_aliases;
-use crate::event::{Event, Notice, Subject};
+use crate::event::{Notice, Subject};
 use crate::info::{InfoWarning, PdoSource, Readout, SiiExtent, SiiProblem, SubDeviceInfo};
 use crate::junction::JunctionMode;
 use crate::ring::RingState;
 use crate::ring_status::LinkCounts;
 pub use crate::segment::Scan;
+use crate::segment::findings::ScanFinding;
 use crate::supervisor::{Bus, BusError, Reply};
 use crate::topology::{Closing, NodeStatus, Topology, rings_shown};
 
@@ -88,8 +89,6 @@ pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scanned, ScanError
         expected = match attempt(bus, options, expected, &mut power_ons).await {
             Ok(mut scanned) => {
                 complete(bus, &mut scanned.scan, options.pdos).await;
-                let subdevices = scanned.scan.subdevices.len();
-                scanned.findings.push(Event::ScanFinished { subdevices });
                 return Ok(scanned);
             }
             Err(Failure::Unsettled(now)) => {
@@ -169,11 +168,11 @@ async fn attempt(
     // Declared connections are not known yet.
     if options.junctions != JunctionMode::Strict {
         let exact = options.enhanced_line_crossed && locate_crossings(bus, &mut scan).await;
-        findings.extend(cabling_findings(bus, &scan, exact));
+        findings.push(ScanFinding::Cabling(cabling_findings(bus, &scan, exact)));
     }
-    findings.extend(closings.into_iter().map(|closing| Event::JunctionLearned { closing }));
+    findings.extend(closings.into_iter().map(ScanFinding::JunctionLearned));
     if not_learned > 0 {
-        findings.push(Event::JunctionsNotLearned { rings: not_learned });
+        findings.push(ScanFinding::JunctionsNotLearned(not_learned));
     }
     Ok(Scanned { scan, findings })
 }
@@ -483,15 +482,12 @@ pub(super) fn describe(readout: Readout, identified: &Identified) -> SubDeviceIn
     info
 }
 
-fn findings_of(scan: &Scan) -> Vec<Event> {
-    let mut findings = Vec::new();
-    for info in &scan.subdevices {
-        let oddity = |warning: &InfoWarning| Event::SiiOddity { position: info.position, what: warning.to_string() };
-        findings.extend(info.warnings.iter().map(oddity));
-    }
-    for duplicate in duplicate_aliases(&scan.subdevices) {
-        let (first, second) = (duplicate.first, duplicate.second);
-        findings.push(Event::DuplicateAlias { alias: duplicate.alias, first, second });
-    }
-    findings
+fn findings_of(scan: &Scan) -> Vec<ScanFinding> {
+    let of_sii = |info: &SubDeviceInfo| {
+        let position = info.position;
+        let finding = |warning: &InfoWarning| ScanFinding::Sii { position, warning: *warning };
+        info.warnings.iter().map(finding).collect::<Vec<_>>()
+    };
+    let duplicates = duplicate_aliases(&scan.subdevices).into_iter().map(ScanFinding::DuplicateAlias);
+    scan.subdevices.iter().flat_map(of_sii).chain(duplicates).collect()
 }

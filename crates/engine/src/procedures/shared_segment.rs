@@ -17,7 +17,7 @@ use super::sii::{EepromTurns, SiiCache};
 use super::undeclared::UndeclaredMailboxes;
 use crate::board::Board;
 use crate::mail::Mailbox;
-use crate::segment::clocks::ClockObservation;
+use crate::segment::clocks::{ClockFinding, ClockObservation, ClockVersions};
 use crate::segment::disturbance::{Disturbance, Wanted};
 use crate::segment::effect::{Effect, Task};
 use crate::segment::{
@@ -142,6 +142,11 @@ impl SharedSegment {
     /// Passes a finding of an attempt to bring up a member to the model.
     pub(super) fn observe_member(&self, (index, attempt): (usize, u32), finding: MemberFinding<'_>) {
         self.observe(Observation::OfMember { index, attempt, finding });
+    }
+
+    /// Passes a finding of clocks to the model, with their version when it was asked for.
+    pub(super) fn find_of_clocks(&self, versions: ClockVersions, finding: ClockFinding<'_>) {
+        self.observe_clocks(ClockObservation::Found(versions, finding));
     }
 
     /// Passes an observation of clocks to the model.

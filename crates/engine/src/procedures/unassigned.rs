@@ -31,7 +31,7 @@ use crate::info::SubDeviceInfo;
 use crate::segment::disturbance::Disturbance;
 use crate::segment::member::Phase;
 use crate::segment::unassigned::Matches;
-use crate::segment::{Observation, SubDeviceKey};
+use crate::segment::{Observation, SubDeviceKey, Versions};
 use crate::supervisor::{Bus, BusError};
 
 /// Pause before a failed read of an SII is repeated; it doubles with every failure.
@@ -47,39 +47,43 @@ const BUS_PATIENCE: u32 = 3;
 /// known.
 pub(super) async fn search(bus: &Bus, segment: &SharedSegment) -> bool {
     let Some(turn) = segment.disturb(Disturbance::Readdress, LIMIT).await else { return false };
-    let found = find(bus, segment).await;
-    drop(turn);
+    let mut versions = segment.view().versions();
+    let found = find(bus, segment, &mut versions).await;
     let result = match found {
         Ok(true) => Ok(()),
         Ok(false) => Err("SubDevices answer that cannot be distinguished".into()),
         Err(error) => Err(error.to_string()),
     };
     let is_complete = result.is_ok();
-    segment.observe(Observation::Searched(result));
+    segment.observe(Observation::Searched { versions, result });
+    drop(turn);
     if segment.view().are_frames_doubtful() {
         frame_limit::explain(bus, segment).await;
     }
     is_complete
 }
 
-/// True if all SubDevices are known.
-async fn find(bus: &Bus, segment: &SharedSegment) -> Result<bool, BusError> {
-    let versions = segment.view().versions();
+/// True if all SubDevices are known. The version is that of the addresses that it reads and assigns.
+async fn find(bus: &Bus, segment: &SharedSegment, versions: &mut Versions) -> Result<bool, BusError> {
     let Some(before) = view(bus).await? else { return Ok(false) };
     let old = segment.view().unknown(&before);
     if old.is_empty() {
-        segment.observe(Observation::Places { versions, view: &before });
+        segment.observe(Observation::Places { versions: *versions, view: &before });
         return Ok(true);
     }
     // A SubDevice with a new address is read again.
     segment.observe(Observation::Readdressing(&old));
+    *versions = segment.view().versions();
     let (given, complete) = give(bus, segment, &before, &old).await?;
-    let versions = segment.view().versions();
+    let asked = segment.view().versions();
     let Some(mut after) = view(bus).await? else { return Ok(false) };
     let owners = segment.view().owners(&before.stations);
-    restore(bus, segment, &owners, &before, &mut after).await?;
-    segment.observe(Observation::Places { versions, view: &after });
-    segment.observe(Observation::Given { versions, view: &after, given: &given });
+    let restored = restore(bus, segment, &owners, &before, &mut after).await;
+    *versions = segment.view().versions();
+    restored?;
+    segment.observe(Observation::Places { versions: asked, view: &after });
+    segment.observe(Observation::Given { versions: asked, view: &after, given: &given });
+    *versions = segment.view().versions();
     let is_known = segment.view().unknown(&after).is_empty();
     Ok(complete && is_known)
 }

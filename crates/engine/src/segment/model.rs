@@ -10,10 +10,11 @@ use ringcat_wire::register::DlControl;
 use super::addresses::Addresses;
 use super::attention::{Attention, Round};
 use super::breaks::Breaks;
+use super::cable_watch::CableWatch;
 use super::cabling::Cabling;
 use super::changes::{Changes, Compared};
 use super::choices::Choices;
-use super::clocks::Clocks;
+use super::clocks::{ClockVersions, Clocks};
 use super::crossings::{Crossings, LineCheck};
 use super::disturbance::{Disturbance, Slot};
 use super::hot_connect::HotConnect;
@@ -102,6 +103,8 @@ pub struct Segment {
     /// What is known of the clocks from a former application or another process.
     pub(super) known_clocks: Option<Rc<KnownClocks>>,
     pub(super) breaks: Breaks,
+    /// Recent errors of the cables of a version of the cabling.
+    pub(super) cable_watches: (u32, Vec<CableWatch>),
     pub(super) local_rings: LocalRings,
     pub(super) silence: Silence,
     pub(super) crossings: Crossings,
@@ -132,6 +135,7 @@ impl Segment {
             compared: Compared::default(),
             ring: Ring::new(ring, carriers),
             breaks: Breaks::default(),
+            cable_watches: (0, Vec::new()),
             local_rings: LocalRings::new(&cabling, &subdevices),
             silence: Silence::default(),
             crossings: Crossings::new(&cabling, &subdevices, choices),
@@ -291,6 +295,17 @@ impl Segment {
         }
     }
 
+    /// The version of the clocks, for a procedure that starts now.
+    pub fn clock_versions(&self) -> ClockVersions {
+        let (isolations, holds) = (self.slot.isolations(), self.board.clocks.holds());
+        ClockVersions { changes: self.clocks.changes, isolations, holds }
+    }
+
+    /// Whether no SubDevice was out of reach on purpose since this number of isolations.
+    pub(super) fn was_all_in_reach(&self, isolations: u32) -> bool {
+        self.slot.running() != Some(Disturbance::IsolateRings) && isolations == self.slot.isolations()
+    }
+
     /// Whether station addresses are those of this version.
     pub(super) fn are_addresses_as_in(&self, versions: Versions) -> bool {
         versions.addresses == self.addresses.version()
@@ -298,8 +313,7 @@ impl Segment {
 
     /// Whether positions and station addresses that were requested in this version are still those of the segment.
     pub fn are_places_valid(&self, versions: Versions) -> bool {
-        let is_isolating = self.slot.running() == Some(Disturbance::IsolateRings);
-        !is_isolating && versions.isolations == self.slot.isolations() && self.are_addresses_as_in(versions)
+        self.was_all_in_reach(versions.isolations) && self.are_addresses_as_in(versions)
     }
 
     /// Whether enough searches for SubDevices have failed for a test of the number of datagrams per frame.

@@ -15,6 +15,7 @@ use super::clocks::ClockObservation;
 use super::crossings::LineCheck;
 use super::disturbance::Wanted;
 use super::effect::Shown;
+use super::findings::{DeclarationFinding, ScanFinding};
 use super::given::Given;
 use super::idle::IdleObservation;
 use super::key::SubDeviceKey;
@@ -32,11 +33,9 @@ use super::view::View;
 #[cfg(feature = "standby")]
 use crate::board::live::Life;
 use crate::declared::Move;
-use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::ring::FrameLimit;
 use crate::ring_status::CableErrors;
-use crate::time::Instant;
 use crate::topology::NodeStatus;
 
 /// An observation of MainDevice redundancy.
@@ -147,15 +146,26 @@ pub enum Observation<'a> {
     RoundWanted,
     /// Another round is requested after a pause.
     RoundWantedIn(Duration),
-    /// It is tested how many datagrams a frame may hold. Until this time no other test is necessary.
-    FramesTested(Instant),
-    /// A frame may hold this number of datagrams: no other test is necessary.
-    FramesLimited(FrameLimit),
+    /// It is about to be tested how many datagrams a frame may hold: no other test is necessary for some time.
+    FramesTested,
+    /// A frame may hold this number of datagrams: no other test is necessary. It is refused if the cabling has changed
+    /// since the test began, or SubDevices were out of reach on purpose.
+    FramesLimited {
+        /// Version of the model when the test began.
+        versions: Versions,
+        /// The limit.
+        limit: FrameLimit,
+    },
 
     /// A scan that the application has requested begins, with new station addresses.
     ScanBegun,
-    /// What it has found, in events; refused if it was given up.
-    ScanShows(Vec<Event>),
+    /// What it has found beside its result, in the order of the reports; refused if it was given up.
+    ScanShows {
+        /// The findings.
+        findings: Vec<ScanFinding>,
+        /// SubDevices that were found.
+        subdevices: usize,
+    },
     /// It has ended; the reason if it failed.
     ScanEnded(Result<Scan, String>),
     /// The segment was scanned again without an application; SubDevices in place have kept their addresses.
@@ -173,8 +183,8 @@ pub enum Observation<'a> {
         /// Its data.
         read: &'a SubDeviceInfo,
     },
-    /// What the comparison of a declaration with the scan shows.
-    Compared(Event),
+    /// A finding of the comparison of a declaration with the scan. There is no wait between both and this.
+    Compared(DeclarationFinding),
     /// An application declares SubDevices.
     Activated(Box<Declared>),
     /// Both halves know the declaration: the procedures of the application begin. The configuration begins at once, or
@@ -251,8 +261,15 @@ pub enum Observation<'a> {
         /// The addresses.
         given: &'a [Given],
     },
-    /// A search for SubDevices without a known address has ended; the reason if not all are known.
-    Searched(Result<(), String>),
+    /// A search for SubDevices without a known address has ended; the reason if not all are known. A failure is refused
+    /// if station addresses have changed since, or SubDevices were out of reach on purpose: it is one of another
+    /// segment.
+    Searched {
+        /// Version of the model when the search last read addresses.
+        versions: Versions,
+        /// The result.
+        result: Result<(), String>,
+    },
     /// An unassigned SubDevice was read, or could not be: then with the reason, if it is to be reported.
     Read {
         /// The SubDevice.
@@ -328,8 +345,6 @@ pub enum Observation<'a> {
         versions: Versions,
         /// The new errors.
         fresh: &'a [CableErrors],
-        /// What is to be reported of them.
-        rising: Vec<Event>,
     },
 
     /// Clocks were measured, written, read or lost.
@@ -351,7 +366,9 @@ pub enum Observation<'a> {
     /// Port commands to this SubDevice are stored from now on.
     PortsFollowed(StationAddress),
     /// Ports of these SubDevices are about to be changed for a moment; with their settings before. None: they are
-    /// restored, or expire.
+    /// restored, or expire. It is no finding that may be outdated: only the disturbance under way alters ports, and
+    /// what the application orders since the settings were read is counted ([`Observation::PortsOrdered`]) and
+    /// restored.
     PortsAltered(&'a [(StationAddress, DlControl)]),
     /// A port command to a SubDevice whose commands are stored is about to be sent.
     PortsOrdered {
@@ -371,7 +388,8 @@ pub enum Observation<'a> {
         /// The value read.
         control: DlControl,
     },
-    /// Ports were closed to cut a SubDevice off.
+    /// Ports were closed to cut a SubDevice off. It is no finding that may be outdated: they stay closed until this
+    /// MainDevice opens them, whatever the segment does.
     Blocked(&'a [BlockedPort]),
     /// The closed ports are about to be opened.
     Unblocking,

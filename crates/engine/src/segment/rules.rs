@@ -3,6 +3,7 @@
 mod breaks;
 mod clocks;
 mod crossings;
+mod findings;
 mod fit;
 mod group_matching;
 mod idle;

@@ -139,7 +139,7 @@ fn status(conf: &Path) -> Result<ExitCode, String> {
     let Ok((Answer::Masters(masters), _)) = client.ask(0, Query::Masters, Vec::new()) else {
         return Err("ringcatd does not say which masters it has".to_owned());
     };
-    for MasterState { master, links, owner, fault } in masters {
+    for MasterState { master, links, owner, fault, .. } in masters {
         let state = match (owner, fault) {
             (_, Some(fault)) => format!("not driven: {fault}"),
             (Some(owner), None) => format!("driven by {owner}"),

@@ -24,10 +24,10 @@ fn check(bytes: &[u8]) {
 pub fn seeds() -> Vec<Vec<u8>> {
     let numbered = |what| Content::Query(Numbered { id: 1, master: 0, what });
     let answered = |what| Content::Answer(Numbered { id: 1, master: 0, what });
-    let links = HandedLinks {
-        main: HandedLink::Interface { name: "eth1".to_owned(), slots: 128, absent_mac: Some([2, 0, 0, 0, 0, 1]) },
-        redundant: Some(HandedLink::Pipe),
-    };
+    let main = HandedLink::Interface { name: "eth1".to_owned(), slots: 128, absent_mac: Some([2, 0, 0, 0, 0, 1]) };
+    let mut handed = HandedBus::new(HandedLinks::new(main, Some(HandedLink::Pipe)));
+    (handed.has_lock, handed.can_switch, handed.debug_level) = (true, true, 1);
+    handed.interfaces.push("eoe0s1".to_owned());
     let contents = [
         Content::Hello { program: "program".to_owned() },
         Content::Welcome { right: Right::Change, pid: 1 },
@@ -39,13 +39,7 @@ pub fn seeds() -> Vec<Vec<u8>> {
         answered(Ok(Answer::State(Box::default()))),
         answered(Err(Refusal::NoMaster { master: 1, present: vec![0, 2] })),
         Content::Take { master: 0, ethernet: true },
-        Content::Taken(HandedBus {
-            links,
-            has_lock: true,
-            interfaces: vec!["eoe0s1".to_owned()],
-            can_switch: true,
-            debug_level: 1,
-        }),
+        Content::Taken(handed),
         Content::MakeInterface { name: "eoe0s1".to_owned(), mac: [2, 0, 0, 0, 0, 1] },
         Content::Interface { name: "eoe0s1".to_owned(), fault: Some("taken".to_owned()) },
         Content::SwitchLink { is_redundant: true, up: false },

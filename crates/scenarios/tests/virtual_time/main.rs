@@ -30,6 +30,7 @@ mod domains;
 mod double_faults;
 mod eeprom;
 mod eeprom_writes;
+mod ended_disturbances;
 mod eni;
 mod esi;
 mod esi_declared;

@@ -16,7 +16,7 @@ use ringcat_wire::register::map;
 use super::watch::{keep, watch};
 use crate::event::Subject;
 use crate::procedures::shared_segment::SharedSegment;
-use crate::segment::clocks::{AdoptedClock, AdoptedClocks, ClockObservation};
+use crate::segment::clocks::{AdoptedClock, AdoptedClocks, ClockFinding, ClockObservation};
 use crate::supervisor::{Bus, BusError, Reply};
 
 /// DC_SYSTEM_TIME_OFFSET and DC_SYSTEM_TIME_DELAY.
@@ -34,7 +34,8 @@ pub(in crate::procedures) async fn keep_adopted_clocks(bus: Bus, segment: Shared
         }
     }
     if let Err(reason) = adopted {
-        segment.observe_clocks(ClockObservation::SetUpFailed(reason));
+        let versions = segment.view().clock_versions();
+        segment.find_of_clocks(versions, ClockFinding::SetUpFailed(reason));
     }
     keep(bus, segment).await;
 }
@@ -42,6 +43,7 @@ pub(in crate::procedures) async fn keep_adopted_clocks(bus: Bus, segment: Shared
 async fn adopt(bus: &Bus, segment: &SharedSegment) -> Result<(), String> {
     let known = segment.view().known_clocks().ok_or_else(|| "nothing is known of the clocks".to_string())?;
     segment.observe_clocks(ClockObservation::SetUpBegun);
+    let versions = segment.view().clock_versions();
     let (reference, stations): (_, Vec<StationAddress>) = {
         let view = segment.view();
         let with_clock = view.clocks().nodes.iter().filter(|node| node.has_clock);
@@ -56,12 +58,9 @@ async fn adopt(bus: &Bus, segment: &SharedSegment) -> Result<(), String> {
     let time = reply.data.first_chunk().filter(|_| reply.wkc() == Wkc(1));
     let time = time.ok_or_else(|| format!("the reference clock {reference} does not answer"))?;
     bus.step(Subject::Clocks, || format!("{} clocks adopted, reference {reference}", clocks.len()));
-    segment.observe_clocks(ClockObservation::Adopted(&AdoptedClocks {
-        known: &known,
-        clocks: &clocks,
-        time: u64::from_le_bytes(*time),
-        sent_at: reply.sent_at,
-    }));
+    let (time, sent_at) = (u64::from_le_bytes(*time), reply.sent_at);
+    let adopted = AdoptedClocks { known: &known, clocks: &clocks, time, sent_at };
+    segment.find_of_clocks(versions, ClockFinding::Adopted(&adopted));
     Ok(())
 }
 

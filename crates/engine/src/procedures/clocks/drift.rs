@@ -9,7 +9,7 @@ use ringcat_wire::register::map;
 use crate::link::Link;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::segment::Segment;
-use crate::segment::clocks::ClockObservation;
+use crate::segment::clocks::ClockFinding;
 use crate::supervisor::Bus;
 
 /// Consecutive distributions; then the bus is free for others for [`BURST_PAUSE`].
@@ -25,10 +25,10 @@ const NONE: StationAddress = StationAddress(0);
 
 /// Distributes the reference time.
 pub(in crate::procedures) async fn compensate_drift(bus: Bus, segment: SharedSegment) {
-    let (mut left, followers) = {
+    let (mut left, followers, versions) = {
         let view = segment.view();
         let followers = view.clocks().nodes.iter().filter(|node| node.has_clock).count() as u16;
-        (view.clocks().config.drift_distributions, followers)
+        (view.clocks().config.drift_distributions, followers, view.clock_versions())
     };
     let (mut next, mut reading, mut number) = (bus.now(), None, 0);
     while left > 0 {
@@ -62,7 +62,7 @@ pub(in crate::procedures) async fn compensate_drift(bus: Bus, segment: SharedSeg
             bus.sleep_until(next.max(bus.now() + BURST_PAUSE)).await;
         }
     }
-    segment.observe_clocks(ClockObservation::Compensated);
+    segment.find_of_clocks(versions, ClockFinding::Compensated);
 }
 
 /// The references by link. `None` without references, and while a ring opens or closes: the time would be distributed

@@ -27,7 +27,7 @@ use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::unassigned::view;
 use crate::ring::RingState;
 use crate::segment::Observation;
-use crate::segment::clocks::{ClockObservation, Clocks, Node};
+use crate::segment::clocks::{ClockFinding, ClockKey, ClockObservation, ClockVersions, Clocks, Node};
 use crate::segment::disturbance::Disturbance;
 use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
@@ -49,6 +49,8 @@ const CLOSING_PAUSE: Duration = Duration::from_millis(1);
 /// The SubDevices that answer, in the order in which frames pass them.
 #[derive(Clone, Debug)]
 struct Survey {
+    /// Of the clocks, when it began.
+    versions: ClockVersions,
     stations: Vec<StationAddress>,
     dl_status: Vec<DlStatus>,
     topology: Topology,
@@ -104,14 +106,14 @@ pub(super) async fn measure(bus: &Bus, segment: &SharedSegment, opening: Opening
     if !is_open_question || opening != Opening::Nothing || rings.is_empty() || gave_no_result {
         let is_still_open = is_open_question && !rings.is_empty();
         let without_result = is_still_open.then_some(survey.wiring);
-        segment.observe_clocks(ClockObservation::OpenedWithoutResult(without_result));
+        segment.find_of_clocks(survey.versions, ClockFinding::OpenedWithoutResult(without_result));
         return exact(measured);
     }
     let survey = Survey { latched: None, ..survey.clone() };
     measure_open(bus, segment, &survey, &rings, &[]).await?;
     measured = take(bus, segment, &survey).await?;
     let without_result = is_open(&measured).then_some(survey.wiring);
-    segment.observe_clocks(ClockObservation::OpenedWithoutResult(without_result));
+    segment.find_of_clocks(survey.versions, ClockFinding::OpenedWithoutResult(without_result));
     exact(measured)
 }
 
@@ -126,7 +128,7 @@ fn recall(bus: &Bus, segment: &SharedSegment, survey: &Survey) -> Option<Measure
         (is_same.then_some(known)?, clocks.reference)
     };
     bus.step(Subject::Clocks, || "the segment is as it was measured before".to_string());
-    segment.observe_clocks(ClockObservation::Recalled(&known));
+    segment.find_of_clocks(survey.versions, ClockFinding::Recalled(&known));
     Some(known.measured.clone().referred_to(reference))
 }
 
@@ -263,6 +265,7 @@ async fn survey_segment(bus: &Bus, segment: &SharedSegment) -> Result<Survey, St
 
 /// `None` while the segment changes.
 async fn survey_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Survey>, BusError> {
+    let versions = segment.view().clock_versions();
     let Some(before) = view(bus).await? else { return Ok(None) };
     let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
     // Receive times show the port at which frames enter a SubDevice.
@@ -299,6 +302,7 @@ async fn survey_once(bus: &Bus, segment: &SharedSegment) -> Result<Option<Survey
     };
     let wiring = Wiring::new(&topology, is_closed, is_open);
     Ok(Some(Survey {
+        versions,
         stations: before.stations,
         dl_status,
         topology,
@@ -331,7 +335,7 @@ async fn take(bus: &Bus, segment: &SharedSegment, survey: &Survey) -> Result<Mea
         }
     }
     let (measured, cables) = evaluate(segment, survey, &measurements)?;
-    segment.observe_clocks(ClockObservation::Cables(cables));
+    segment.find_of_clocks(survey.versions, ClockFinding::Cables(cables));
     measured.ok_or_else(unfit)
 }
 
@@ -393,8 +397,8 @@ async fn enter_backwards(bus: &Bus, segment: &SharedSegment, stations: &[Station
         return true;
     }
     segment.observe_clocks(ClockObservation::LatchModes(&modes));
-    let write = |bus: Bus, (station, backwards): (StationAddress, bool)| async move {
-        bus.fpwr(station, map::DC_LATCH_MODE, &[u8::from(backwards)]).await
+    let write = |bus: Bus, (key, backwards): (ClockKey, bool)| async move {
+        bus.fpwr(key.station, map::DC_LATCH_MODE, &[u8::from(backwards)]).await
     };
     // SubDevices without the register do not increment the WKC.
     let _ = bus.gather(modes, write).await;

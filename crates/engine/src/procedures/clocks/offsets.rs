@@ -5,12 +5,11 @@ use core::time::Duration;
 
 use alloc::vec::Vec;
 
-use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::map;
 
 use super::set_up::set_up_one;
 use crate::procedures::shared_segment::SharedSegment;
-use crate::segment::clocks::ClockObservation;
+use crate::segment::clocks::{ClockFinding, ClockKey};
 use crate::supervisor::Bus;
 
 /// Maximum wait until the exchange distributes no time: an application whose cycles are longer, or have stopped,
@@ -25,13 +24,19 @@ pub(super) async fn write_offsets(bus: &Bus, segment: &SharedSegment) {
         let posted = bus.posted();
         segment.until_posted(posted, until, || false).await;
     }
+    let versions = segment.view().clock_versions();
+    let missed = write_all(bus, segment).await;
+    segment.find_of_clocks(versions, ClockFinding::OffsetsWritten { missed: &missed });
+}
+
+/// Writes the offsets of all clocks; those that did not answer.
+pub(super) async fn write_all(bus: &Bus, segment: &SharedSegment) -> Vec<ClockKey> {
     let all = segment.view().clocks().offsets();
-    let written = bus.gather(all, |bus, (station, offset)| async move {
-        let result = bus.fpwr(station, map::DC_SYSTEM_TIME_OFFSET, &offset.to_le_bytes()).await;
-        result.is_err().then_some(station)
+    let written = bus.gather(all, |bus, (key, offset)| async move {
+        let result = bus.fpwr(key.station, map::DC_SYSTEM_TIME_OFFSET, &offset.to_le_bytes()).await;
+        result.is_err().then_some(key)
     });
-    let missed: Vec<StationAddress> = written.await.into_iter().flatten().collect();
-    segment.observe_clocks(ClockObservation::OffsetsWritten { missed: &missed });
+    written.await.into_iter().flatten().collect()
 }
 
 /// Sets up clocks that answer again, and whose offsets were changed meanwhile.

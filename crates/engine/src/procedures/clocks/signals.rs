@@ -9,10 +9,10 @@ use ringcat_wire::register::map;
 use super::not_locked::{NotLocked, SignalsError};
 use super::set_up::set_up_one;
 use crate::clocks::{extend, first_pulse, start::whole_cycle};
-use crate::config::{PulseGrid, SyncSignals, WhenUnlocked};
+use crate::config::{PulseGrid, SyncSignals};
 use crate::info::SubDeviceInfo;
 use crate::procedures::shared_segment::SharedSegment;
-use crate::segment::clocks::{ClockObservation, Clocks, Node};
+use crate::segment::clocks::{ClockFinding, ClockObservation, Clocks, Node};
 use crate::supervisor::{Bus, BusError};
 
 /// Minimum time from the read of the clock to the first pulse (protocol 7.3).
@@ -30,13 +30,14 @@ pub(in crate::procedures) async fn restore(bus: &Bus, segment: &SharedSegment, m
     if bus.within(MEASURING_LIMIT, are_set_up).await.is_err() {
         return Ok(());
     }
-    let known = |node: &Node| (node.offset_ns, node.unit.is_none());
-    let Some((expected, is_new)) = segment.view().clocks().node_at(station).map(known) else { return Ok(()) };
-    let offset: [u8; 4] = bus.fprd_array(station, map::DC_SYSTEM_TIME_OFFSET).await?;
-    if u32::from_le_bytes(offset) == expected as u32 && !is_new {
+    let known = |node: &Node| (node.key(), node.offset_ns);
+    let Some((key, written_ns)) = segment.view().clocks().node_at(station).map(known) else { return Ok(()) };
+    let versions = segment.view().clock_versions();
+    let read = u32::from_le_bytes(bus.fprd_array(station, map::DC_SYSTEM_TIME_OFFSET).await?);
+    segment.find_of_clocks(versions, ClockFinding::OffsetRead { key, written_ns, read });
+    if !segment.view().clocks().node_at(station).is_some_and(|node| node.is_unset) {
         return Ok(());
     }
-    segment.observe_clocks(ClockObservation::RegistersLost(station));
     // Its delay is known when the segment has been measured with it. The wait is limited for a segment that changes
     // repeatedly.
     let measured = segment.until(|segment| segment.clocks().doubtful_since().is_none().then_some(()));
@@ -65,16 +66,20 @@ fn clock_of(segment: &SharedSegment, member: usize) -> Option<StationAddress> {
 pub(in crate::procedures) async fn start_signals(
     bus: &Bus,
     segment: &SharedSegment,
-    member: usize,
+    (member, attempt): (usize, u32),
     station: StationAddress,
     signals: &SyncSignals,
     limit: Duration,
 ) -> Result<(), SignalsError> {
+    let key = segment.view().clocks().node_at(station).map(Node::key);
+    let are_starting = |are_starting: bool| {
+        key.into_iter().for_each(|key| segment.observe_clocks(ClockObservation::Signals { key, are_starting }));
+    };
     let [control, activation] = signals.assign_activate.to_le_bytes();
     bus.fpwr(station, map::DC_ACTIVATION, &[0]).await?;
-    segment.observe_clocks(ClockObservation::Signals { station, are_starting: false });
+    are_starting(false);
     let result = wait_until_about_right(bus, segment, member, limit).await;
-    or_go_on(segment, member, result).map_err(SignalsError::NotLocked)?;
+    or_go_on(segment, (member, attempt), result).map_err(SignalsError::NotLocked)?;
     bus.fpwr(station, map::DC_CYCLIC_UNIT_CONTROL, &[control]).await?;
     let sync1 = signals.active_sync1_ns();
     let mut cycles = [0; 8];
@@ -83,7 +88,7 @@ pub(in crate::procedures) async fn start_signals(
     bus.fpwr(station, map::DC_SYNC0_CYCLE, &cycles).await?;
     // From now on the system time does not jump.
     segment.until(|segment| (!segment.clocks().are_offsets_due()).then_some(())).await;
-    segment.observe_clocks(ClockObservation::Signals { station, are_starting: true });
+    are_starting(true);
     let low = u32::from_le_bytes(bus.fprd_array(station, map::DC_SYSTEM_TIME).await?);
     let near = bus.now().0.wrapping_add(segment.view().clocks().epoch);
     let earliest = extend(low, near).wrapping_add(AHEAD_NS);
@@ -103,18 +108,17 @@ fn grid_ns(segment: &SharedSegment, cycle: u64) -> i64 {
     begin.and_then(|begin| begin.wrapping_sub(shift).checked_rem(cycle)).map_or(0, |ns| ns as i64)
 }
 
-/// What follows from clocks that are not locked in time. A SubDevice with an unknown delay never goes on: its time may
-/// be wrong by any amount.
-fn or_go_on(segment: &SharedSegment, member: usize, result: Result<(), NotLocked>) -> Result<(), NotLocked> {
-    let choice = segment.view().clocks().config.when_unlocked;
-    match (result, choice) {
-        (Err(not_locked), WhenUnlocked::GoOn) if not_locked.hidden.is_none() => {
-            let reason = not_locked.to_string();
-            segment.observe_clocks(ClockObservation::WentOnUnlocked { member, reason });
-            Ok(())
-        }
-        (result, WhenUnlocked::GoOn | WhenUnlocked::StayInSafeOp) => result,
-    }
+/// What follows from clocks that are not locked in time: the model decides whether the member goes on, and reports it.
+fn or_go_on(
+    segment: &SharedSegment,
+    (member, attempt): (usize, u32),
+    result: Result<(), NotLocked>,
+) -> Result<(), NotLocked> {
+    let Err(not_locked) = result else { return Ok(()) };
+    let (reason, is_hidden) = (not_locked.to_string(), not_locked.hidden.is_some());
+    let versions = segment.view().clock_versions();
+    segment.find_of_clocks(versions, ClockFinding::NotLocked { member, attempt, reason, is_hidden });
+    if segment.view().clocks().goes_on_unlocked(is_hidden) { Ok(()) } else { Err(not_locked) }
 }
 
 async fn wait_until_about_right(
@@ -138,7 +142,7 @@ async fn wait_until_about_right(
 pub(in crate::procedures) async fn wait_for_lock(
     bus: &Bus,
     segment: &SharedSegment,
-    member: usize,
+    (member, attempt): (usize, u32),
 ) -> Result<(), NotLocked> {
     let (limit, window_ns, samples) = {
         let view = segment.view();
@@ -163,7 +167,7 @@ pub(in crate::procedures) async fn wait_for_lock(
         if is_locked { Ok(()) } else { Err(NotLocked { waited: limit, difference_ns, window_ns, other, hidden }) }
     };
     let result = wait(bus, segment, limit, check).await;
-    or_go_on(segment, member, result)
+    or_go_on(segment, (member, attempt), result)
 }
 
 /// Waits until clocks pass a check; the error is the result of the check at the time limit.

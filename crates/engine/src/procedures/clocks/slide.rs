@@ -6,13 +6,9 @@
 
 use core::time::Duration;
 
-use alloc::vec::Vec;
-
-use ringcat_wire::address::StationAddress;
-use ringcat_wire::register::map;
-
+use super::offsets::write_all;
 use crate::procedures::shared_segment::SharedSegment;
-use crate::segment::clocks::ClockObservation;
+use crate::segment::clocks::{ClockFinding, ClockObservation};
 use crate::supervisor::Bus;
 use crate::time::Instant;
 
@@ -52,12 +48,8 @@ pub(super) async fn slide(bus: &Bus, segment: &SharedSegment, ring_changes: u32)
 async fn step(bus: &Bus, segment: &SharedSegment, step_ns: u64) -> Instant {
     let begun = bus.now();
     segment.observe_clocks(ClockObservation::SteppingBack(step_ns));
-    let all = segment.view().clocks().offsets();
-    let written = bus.gather(all, |bus, (station, offset)| async move {
-        let result = bus.fpwr(station, map::DC_SYSTEM_TIME_OFFSET, &offset.to_le_bytes()).await;
-        result.is_err().then_some(station)
-    });
-    let missed: Vec<StationAddress> = written.await.into_iter().flatten().collect();
-    segment.observe_clocks(ClockObservation::SteppedBack { missed: &missed });
+    let versions = segment.view().clock_versions();
+    let missed = write_all(bus, segment).await;
+    segment.find_of_clocks(versions, ClockFinding::SteppedBack { missed: &missed });
     begun
 }

@@ -12,7 +12,7 @@ use alloc::string::ToString;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use ringcat_wire::address::{StationAddress, Wkc};
+use ringcat_wire::address::Wkc;
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DcSpeedCounterDifference, DcSpeedCounterStart, DcSystemTimeDifference, map};
@@ -24,7 +24,9 @@ use super::set_up::{measure_again, set_filters, set_up, write_delays};
 use super::slide::slide;
 use crate::link::Link;
 use crate::procedures::shared_segment::SharedSegment;
-use crate::segment::clocks::{Answer, Answers, ClockObservation, Difference, Due, Node};
+use crate::segment::clocks::{
+    Answer, Answers, ClockFinding, ClockKey, ClockObservation, ClockVersions, Difference, Due, Node,
+};
 use crate::segment::{Changes, Observation};
 use crate::supervisor::{Bus, Reply};
 use crate::time::Instant;
@@ -56,11 +58,13 @@ pub(in crate::procedures) async fn keep_clocks(bus: Bus, segment: SharedSegment)
 }
 
 async fn try_set_up(bus: &Bus, segment: &SharedSegment, opening: Opening) {
-    let done = match set_up(bus, segment, opening).await {
-        Ok(()) => ClockObservation::SetUp,
-        Err(reason) => ClockObservation::SetUpFailed(reason),
+    segment.observe_clocks(ClockObservation::SetUpBegun);
+    let versions = segment.view().clock_versions();
+    let done = match set_up(bus, segment, versions, opening).await {
+        Ok(()) => ClockFinding::SetUp,
+        Err(reason) => ClockFinding::SetUpFailed(reason),
     };
-    segment.observe_clocks(done);
+    segment.find_of_clocks(versions, done);
 }
 
 /// Runs until the MainDevice stops.
@@ -158,44 +162,46 @@ async fn wait(
 
 /// Measures the segment after a change.
 async fn measure_once(bus: &Bus, segment: &SharedSegment, since: Instant) {
-    let holds = segment.board.clocks.holds();
-    let failed = match measure_again(bus, segment).await {
+    let versions = segment.view().clock_versions();
+    let failed = match measure_again(bus, segment, versions).await {
         Ok(()) => None,
         Err(_) if bus.now() < since + PATIENCE => return,
         Err(reason) => Some(reason),
     };
-    segment.observe_clocks(ClockObservation::MeasurementEnded { failed, holds });
+    segment.find_of_clocks(versions, ClockFinding::MeasurementEnded { failed });
     set_filters(bus, segment).await;
 }
 
 /// Reads all differences, and executes the resulting actions.
 async fn read_all(bus: &Bus, segment: &SharedSegment, is_explained: bool) {
-    let holds = segment.board.clocks.holds();
-    let stations: Vec<StationAddress> = {
+    let versions = segment.view().clock_versions();
+    let keys: Vec<ClockKey> = {
         let view = segment.view();
-        view.clocks().nodes.iter().filter(|node| node.has_clock).map(|node| node.station).collect()
+        view.clocks().nodes.iter().filter(|node| node.has_clock).map(Node::key).collect()
     };
-    let answers = bus.gather(stations, |bus, station| async move {
-        let target = Target::Station(station, map::DC_SYSTEM_TIME_DIFFERENCE);
+    let answers = bus.gather(keys, |bus, key| async move {
+        let target = Target::Station(key.station, map::DC_SYSTEM_TIME_DIFFERENCE);
         // Including DC_SPEED_COUNTER_START and DC_SPEED_COUNTER_DIFFERENCE. A lost frame gives no information.
         let reply = bus.transfer(Command::Fprd, target, vec![0; 8], Some(Wkc(1))).await.ok()?;
-        Some((station, decode(&reply)))
+        Some((key, decode(&reply)))
     });
     let mut answers: Answers = answers.await.into_iter().flatten().collect();
     read_in_front(bus, segment, &mut answers).await;
-    segment.observe_clocks(ClockObservation::Answers { answers: &answers, is_explained, holds });
+    segment.find_of_clocks(versions, ClockFinding::Answers { answers: &answers, is_explained });
     let due = segment.view().clocks().due();
     match due {
         Due::Nothing | Due::Offsets => {}
         Due::Filters => set_filters(bus, segment).await,
         Due::Delays => {
             let links = segment.view().clocks().unwritten();
+            let written = ClockVersions { holds: versions.holds, ..segment.view().clock_versions() };
             for link in links {
                 if let Err(error) = write_delays(bus, segment, link).await {
-                    segment.observe_clocks(ClockObservation::DelaysNotWritten(error.to_string()));
+                    segment.find_of_clocks(written, ClockFinding::DelaysNotWritten(error.to_string()));
                 }
             }
-            segment.observe_clocks(ClockObservation::Followed { holds });
+            // Stops of the distribution since the answers are not answered yet.
+            segment.find_of_clocks(written, ClockFinding::Followed);
             set_filters(bus, segment).await;
         }
     }
@@ -226,7 +232,7 @@ fn decode(reply: &Reply) -> Answer {
 /// contain the sending delay of the host. Their true differences are computed from one frame that reads them and the
 /// reference.
 async fn read_in_front(bus: &Bus, segment: &SharedSegment, answers: &mut Answers) {
-    let delayed = |node: &Node| (node.station, node.delay_ns);
+    let delayed = |node: &Node| (node.key(), node.delay_ns);
     let groups: Vec<_> = {
         let view = segment.view();
         let groups = Link::ALL.into_iter().filter_map(|link| view.clocks().in_front_on(link));
@@ -237,17 +243,17 @@ async fn read_in_front(bus: &Bus, segment: &SharedSegment, answers: &mut Answers
     };
     for (reference, in_front) in groups {
         for some in in_front.chunks(IN_A_FRAME) {
-            let stations = some.iter().chain([&reference]).map(|(station, _)| *station);
+            let stations = some.iter().chain([&reference]).map(|(key, _)| key.station);
             let read = |station| (Command::Fprd, Target::Station(station, map::DC_SYSTEM_TIME), vec![0; 4]);
             let replies = bus.transfer_all(stations.map(read), Some(Wkc(1))).await;
             let Ok(replies) = replies else { continue };
             let Some((of_reference, others)) = replies.split_last() else { continue };
             let time = |reply: &Reply| reply.data.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
-            for ((station, delay_ns), reply) in some.iter().zip(others) {
-                let Some(answer) = answers.get_mut(station).filter(|answer| answer.link.is_some()) else { continue };
+            for ((key, delay_ns), reply) in some.iter().zip(others) {
+                let Some(answer) = answers.get_mut(key).filter(|answer| answer.link.is_some()) else { continue };
                 // Another frame passed at another time.
                 if reply.frame != of_reference.frame || [reply, of_reference].map(Reply::wkc) != [Wkc(1); 2] {
-                    answers.remove(station);
+                    answers.remove(key);
                     continue;
                 }
                 let way = (delay_ns - reference.1) as u32;
@@ -260,10 +266,11 @@ async fn read_in_front(bus: &Bus, segment: &SharedSegment, answers: &mut Answers
 
 /// Reads the reference clock: the system time at a host time.
 async fn follow_reference(bus: &Bus, segment: &SharedSegment) {
-    let Some(station) = segment.view().clocks().reference else { return };
-    let target = Target::Station(station, map::DC_SYSTEM_TIME);
+    let versions = segment.view().clock_versions();
+    let Some(key) = segment.view().clocks().reference_node().map(Node::key) else { return };
+    let target = Target::Station(key.station, map::DC_SYSTEM_TIME);
     let Ok(reply) = bus.transfer(Command::Fprd, target, vec![0; 4], Some(Wkc(1))).await else { return };
     let (Some(bytes), Wkc(1)) = (reply.data.first_chunk(), reply.wkc()) else { return };
     let (low, sent_at) = (u32::from_le_bytes(*bytes), reply.sent_at.0);
-    segment.observe_clocks(ClockObservation::ReferenceTime { low, sent_at });
+    segment.find_of_clocks(versions, ClockFinding::ReferenceTime { key, low, sent_at });
 }

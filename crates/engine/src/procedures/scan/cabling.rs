@@ -1,17 +1,16 @@
 //! Findings of a scan about the cabling: crossed lines, swapped interfaces, unexpected ports (protocol 9.5).
 
-use alloc::string::ToString;
 use alloc::vec::Vec;
 
 use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::PortKind;
 
 use super::Scan;
-use crate::event::Event;
 use crate::link::LinkSet;
 use crate::order::InOrder;
 use crate::procedures::cabling::{Known, cabling, stays_closed};
 use crate::ring::RingState;
+use crate::segment::findings::CablingFindings;
 use crate::segment::{LineCheck, is_swapped};
 use crate::supervisor::Bus;
 use crate::topology::{Closing, Finding, PortOf};
@@ -72,38 +71,13 @@ impl Known for Scan {
 }
 
 /// Unusual cabling. `exact`: the places of crossings are known, also in a closed ring.
-pub(crate) fn cabling_findings(bus: &Bus, scan: &Scan, exact: bool) -> Vec<Event> {
-    let mut findings = Vec::new();
-    let swapped = bus.links() == LinkSet::Ring && is_swapped(&scan.topology);
-    if swapped {
-        findings.push(Event::InterfacesSwapped);
-    }
+pub(crate) fn cabling_findings(bus: &Bus, scan: &Scan, exact: bool) -> CablingFindings {
+    let is_ring = bus.links() == LinkSet::Ring;
     let position = |node: usize| scan.subdevices.get(node).map_or(Position(node as u16), |info| info.position);
-    for finding in &scan.topology.findings {
-        match *finding {
-            Finding::UnconnectedPort0 { node } => findings.push(Event::UnconnectedPort0 { position: position(node) }),
-            Finding::CrossedLine { .. } if swapped => {}
-            Finding::CrossedLine { node, entry_port } => {
-                findings.push(Event::LineCrossed { position: Some(position(node)), entry_port: Some(entry_port) });
-            }
-            Finding::ForcedOpen { .. }
-            | Finding::ClosedWithLink { .. }
-            | Finding::LinkWithoutCommunication { .. }
-            | Finding::Inconsistent { .. } => {
-                findings.push(Event::CablingOddity { position: position(finding.node()), what: finding.to_string() });
-            }
-        }
+    CablingFindings {
+        findings: scan.topology.findings.iter().map(|finding| (position(finding.node()), *finding)).collect(),
+        are_swapped: is_ring && is_swapped(&scan.topology),
+        // In a closed ring only branches on port 2 and crossed SubDevices process the redundant copy (protocol LC-04).
+        is_redundant_processed: is_ring && bus.ring() == RingState::Closed && scan.redundant_count > 0 && !exact,
     }
-    // In a closed ring only branches on port 2 and crossed SubDevices process the redundant copy (protocol LC-04).
-    let crossed_known = scan.topology.findings.iter().any(|finding| matches!(finding, Finding::CrossedLine { .. }));
-    if bus.links() == LinkSet::Ring
-        && bus.ring() == RingState::Closed
-        && scan.redundant_count > 0
-        && !crossed_known
-        && !exact
-        && !swapped
-    {
-        findings.push(Event::LineCrossed { position: None, entry_port: None });
-    }
-    findings
 }

@@ -3,6 +3,7 @@
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::PortKind;
 
+use super::asked::ClockKey;
 use crate::clocks::Unknown;
 use crate::clocks::start::whole_cycle;
 use crate::config::{Passage, SubDeviceConfig, SyncSignals};
@@ -17,6 +18,8 @@ const AVERAGE: u32 = 5;
 pub struct Node {
     /// Its station address.
     pub station: StationAddress,
+    /// How often it has lost its registers.
+    pub losses: u32,
     /// Its position when it was found.
     pub position: u16,
     /// Kinds of its ports.
@@ -77,6 +80,7 @@ impl Node {
     pub fn new(info: &SubDeviceInfo, member: Option<(usize, &SubDeviceConfig)>) -> Node {
         Node {
             station: info.station,
+            losses: 0,
             position: info.position.0,
             ports: info.controller.ports,
             member: member.map(|(index, _)| index),
@@ -102,6 +106,11 @@ impl Node {
             good: 0,
             link: None,
         }
+    }
+
+    /// Its key, for a procedure that starts now.
+    pub const fn key(&self) -> ClockKey {
+        ClockKey { station: self.station, losses: self.losses }
     }
 
     /// It has a clock with a known or estimated delay.

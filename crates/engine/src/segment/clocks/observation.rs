@@ -4,33 +4,67 @@ use alloc::collections::BTreeMap;
 use alloc::rc::Rc;
 use alloc::string::String;
 
+#[cfg(feature = "standby")]
 use ringcat_wire::address::StationAddress;
 
+use super::asked::{ClockKey, ClockVersions};
 use crate::clocks::{Cables, KnownClocks, Latched, Measured, Wiring};
 use crate::config::ReferenceClock;
 use crate::link::Link;
 #[cfg(feature = "standby")]
 use crate::time::Instant;
 
-/// An observation of clocks: measured, written, read or lost.
+/// An observation of clocks: an order, the beginning of something, or a finding.
+///
+/// All but findings are as they are at this moment, without a wait before: they are never outdated. An order or a
+/// beginning that concerns one clock is refused if that has lost its registers since the procedure began.
 #[derive(Debug)]
 pub enum ClockObservation<'a> {
+    /// A finding, with the version of the clocks when it was asked for.
+    Found(ClockVersions, ClockFinding<'a>),
+
     /// The application has chosen the reference.
     ReferenceChosen(ReferenceClock),
-    /// The set-up of all clocks begins.
-    SetUpBegun,
-    /// The set-up failed, for this reason.
-    SetUpFailed(String),
-    /// The segment has changed: its delays may be wrong, and a set-up may succeed.
-    SegmentChanged,
-    /// DC_LATCH_MODE is about to be written; true if frames enter from behind.
-    LatchModes(&'a [(StationAddress, bool)]),
-    /// Cable times from latched receive times.
-    Cables(Cables),
-    /// The cables whose times are still unknown after the rings with them were opened; `None` if all are known.
-    OpenedWithoutResult(Option<Wiring>),
     /// What another process knows of the clocks.
     Known(Rc<KnownClocks>),
+    /// The set-up of all clocks begins.
+    SetUpBegun,
+    /// The segment has changed: its delays may be wrong, and a set-up may succeed.
+    SegmentChanged,
+    /// A declared SubDevice with a clock that was not found by the scan.
+    Came {
+        /// Its index in the declaration.
+        member: usize,
+    },
+    /// Clocks have to be synchronized with their reference.
+    TimeWanted,
+
+    /// DC_LATCH_MODE is about to be written; true if frames enter from behind.
+    LatchModes(&'a [(ClockKey, bool)]),
+    /// SYNC signals of a clock are being started, or are off.
+    Signals {
+        /// The clock.
+        key: ClockKey,
+        /// They are being started.
+        are_starting: bool,
+    },
+    /// The exchange has taken over a shift: it says how far all offsets are set back.
+    SlideBegun,
+    /// All offsets are about to be set back by this number of nanoseconds.
+    SteppingBack(u64),
+}
+
+/// A finding of clocks: measured, written or read values, or that this failed. Findings that were asked for before
+/// another set-up of all clocks are refused; what else refuses each is in the rules (`segment::rules::clocks`).
+#[derive(Debug)]
+pub enum ClockFinding<'a> {
+    /// The set-up failed, for this reason.
+    SetUpFailed(String),
+    /// Cable times from latched receive times.
+    Cables(Cables),
+    /// The cables whose times are still unknown after the rings with them were opened; `None` if all are known. It is
+    /// compared with the cables of the next measurement.
+    OpenedWithoutResult(Option<Wiring>),
     /// The segment is the one that was measured before: cable times and latch modes are those of that measurement.
     Recalled(&'a KnownClocks),
     /// The delays of all clocks, for their set-up.
@@ -58,39 +92,41 @@ pub enum ClockObservation<'a> {
     MeasurementEnded {
         /// Why it could not be measured.
         failed: Option<String>,
-        /// The number of stops of the distribution when it began.
-        holds: u32,
-    },
-    /// A member goes on although the clocks were not locked in time.
-    WentOnUnlocked {
-        /// Its index in the declaration.
-        member: usize,
-        /// The clock that is not locked.
-        reason: String,
     },
     /// Filter depths are written.
-    FiltersWritten(&'a [(StationAddress, [u8; 2])]),
+    FiltersWritten(&'a [(ClockKey, [u8; 2])]),
 
-    /// A declared SubDevice with a clock that was not found by the scan.
-    Came {
+    /// The clocks were not locked when a member needed them.
+    NotLocked {
         /// Its index in the declaration.
         member: usize,
+        /// Its attempt.
+        attempt: u32,
+        /// The clock that is not locked, and why.
+        reason: String,
+        /// The delay of its clock is unknown.
+        is_hidden: bool,
     },
-    /// The registers of a clock do not hold the written values, or were never written.
-    RegistersLost(StationAddress),
+    /// DC_SYSTEM_TIME_OFFSET of a clock whose SubDevice is configured.
+    OffsetRead {
+        /// The clock.
+        key: ClockKey,
+        /// Its offset when that was asked for.
+        written_ns: i64,
+        /// The lower half of the register.
+        read: u32,
+    },
     /// Local times latched by one frame, for the set-up of one clock.
     LatchedFor {
-        /// Its station address.
-        station: StationAddress,
+        /// The clock.
+        key: ClockKey,
         /// Local times.
         latched: &'a LatchedTimes,
         /// System time according to the host, used without a reference.
         host: u64,
     },
     /// Offset and delay of that clock are written.
-    OneSetUp(StationAddress),
-    /// Clocks have to be synchronized with their reference.
-    TimeWanted,
+    OneSetUp(ClockKey),
     /// The static drift compensation has ended.
     Compensated,
 
@@ -100,37 +136,24 @@ pub enum ClockObservation<'a> {
         answers: &'a Answers,
         /// A ring has opened or closed, which explains changes of ports.
         is_explained: bool,
-        /// The number of stops of the distribution when they were read.
-        holds: u32,
     },
-    /// The delays required by [`Due::Delays`](super::life::Due) are written, as far as possible.
-    Followed {
-        /// The number of stops of the distribution when the answers were read.
-        holds: u32,
-    },
-    /// SYNC signals of a clock are being started, or are off.
-    Signals {
-        /// Its station address.
-        station: StationAddress,
-        /// They are being started.
-        are_starting: bool,
-    },
+    /// The delays required by [`Due::Delays`](super::life::Due) are written, as far as possible. The version is that
+    /// of the answers.
+    Followed,
     /// The offsets that are due are written, except to these clocks.
     OffsetsWritten {
         /// Clocks that did not answer.
-        missed: &'a [StationAddress],
+        missed: &'a [ClockKey],
     },
-    /// The exchange has taken over a shift: it says how far all offsets are set back.
-    SlideBegun,
-    /// All offsets are about to be set back by this number of nanoseconds.
-    SteppingBack(u64),
-    /// They are written, except to these clocks.
+    /// The offsets of a step back are written, except to these clocks.
     SteppedBack {
         /// Clocks that did not answer.
-        missed: &'a [StationAddress],
+        missed: &'a [ClockKey],
     },
     /// DC_SYSTEM_TIME of the reference, and the host time at which the frame was sent.
     ReferenceTime {
+        /// The reference.
+        key: ClockKey,
         /// The lower half of the system time.
         low: u32,
         /// Host time in nanoseconds.
@@ -167,10 +190,10 @@ pub struct AdoptedClock {
 }
 
 /// Local times latched by one frame.
-pub type LatchedTimes = BTreeMap<StationAddress, Latched>;
+pub type LatchedTimes = BTreeMap<ClockKey, Latched>;
 
 /// Answers of clocks.
-pub type Answers = BTreeMap<StationAddress, Answer>;
+pub type Answers = BTreeMap<ClockKey, Answer>;
 
 /// The answer of one clock, and the link on which it arrived.
 #[derive(Clone, Copy, Debug, Default)]

@@ -5,6 +5,7 @@ use core::borrow::Borrow;
 
 use ringcat_wire::address::{Position, StationAddress};
 
+use super::asked::{ClockChanges, ClockKey};
 use super::life::{Compensation, Delays, Due, Life, Lock, Running, Unwritten};
 use super::node::Node;
 use super::status::{ClockStatus, HiddenDelay};
@@ -12,7 +13,7 @@ use super::timeline::{Times, common_pattern};
 use crate::board::clocks::References;
 use crate::clocks::DelayRange;
 use crate::clocks::{Cables, FRACTION, KnownClocks, Measured, Passage, Wiring, branches, round};
-use crate::config::{ClockConfig, ReferenceClock, SubDeviceConfig};
+use crate::config::{ClockConfig, ReferenceClock, SubDeviceConfig, WhenUnlocked};
 use crate::declared::SubDeviceId;
 use crate::info::SubDeviceInfo;
 use crate::link::Link;
@@ -36,6 +37,8 @@ pub struct Clocks {
     pub config: ClockConfig,
     /// Phase of the clocks.
     pub(in crate::segment) life: Life,
+    /// Changes so far.
+    pub(in crate::segment) changes: ClockChanges,
     /// By position of the scan, then later ones.
     pub nodes: Vec<Node>,
     /// The reference.
@@ -78,6 +81,7 @@ impl Clocks {
         Clocks {
             config,
             life,
+            changes: ClockChanges::default(),
             nodes,
             reference,
             cables,
@@ -163,6 +167,13 @@ impl Clocks {
         if let Life::Running(running) = &mut self.life { Some(running) } else { None }
     }
 
+    /// The static drift compensation has ended.
+    pub(in crate::segment) fn end_compensation(&mut self) {
+        if let Some(running) = self.running_mut() {
+            running.compensation = Compensation::Idle;
+        }
+    }
+
     pub(in crate::segment) fn is_compensating(&self) -> bool {
         self.running().is_some_and(|running| running.compensation == Compensation::Running)
     }
@@ -207,9 +218,9 @@ impl Clocks {
     }
 
     /// Offsets of the clocks that answer.
-    pub fn offsets(&self) -> Vec<(StationAddress, i64)> {
+    pub fn offsets(&self) -> Vec<(ClockKey, i64)> {
         let answering = self.nodes.iter().filter(|node| node.has_clock && node.link.is_some());
-        answering.map(|node| (node.station, node.offset_ns)).collect()
+        answering.map(|node| (node.key(), node.offset_ns)).collect()
     }
 
     /// Clocks that answer again, and whose offsets were changed meanwhile.
@@ -272,6 +283,12 @@ impl Clocks {
         preferred.or_else(|| candidates().next()).map(|node| node.station)
     }
 
+    /// Makes a clock the reference, or none.
+    pub(in crate::segment) fn refer_to(&mut self, reference: Option<StationAddress>) {
+        let is_other = core::mem::replace(&mut self.reference, reference) != reference;
+        self.changes.delays = self.changes.delays.wrapping_add(u32::from(is_other));
+    }
+
     /// Whether it is the reference of the segment.
     pub fn is_reference(&self, node: &Node) -> bool {
         self.reference == Some(node.station)
@@ -300,6 +317,12 @@ impl Clocks {
         References { main: station(Link::Main), redundant: station(Link::Redundant), redundant_leads }
     }
 
+    /// Whether a member without a locked clock goes on all the same. One with an unknown delay never does: its time may
+    /// be wrong by any amount.
+    pub fn goes_on_unlocked(&self, is_hidden: bool) -> bool {
+        self.config.when_unlocked == WhenUnlocked::GoOn && !is_hidden
+    }
+
     /// Whether delays on a link have different origins.
     pub fn is_mixed(&self, link: Link) -> bool {
         let mut here =
@@ -320,7 +343,7 @@ impl Clocks {
 
     /// Filter depths that differ from the written ones: DC_FILTER_DIFFERENCE and DC_FILTER_SPEED. References and
     /// clocks before them receive the time predicted by the host, all others the time of a reference.
-    pub fn filters(&self) -> Vec<(StationAddress, [u8; 2])> {
+    pub fn filters(&self) -> Vec<(ClockKey, [u8; 2])> {
         let references = Link::ALL.map(|link| self.reference_on(link));
         let nodes = self.nodes.iter().filter(|node| node.has_clock && node.link.is_some());
         let depths = nodes.map(|node| {
@@ -328,7 +351,7 @@ impl Clocks {
             (node, self.filter_depths(node, reference))
         });
         let changed = depths.filter(|(node, depths)| node.filter_depths != Some(*depths));
-        changed.map(|(node, depths)| (node.station, depths)).collect()
+        changed.map(|(node, depths)| (node.key(), depths)).collect()
     }
 
     fn filter_depths(&self, node: &Node, reference: Option<&Node>) -> [u8; 2] {
@@ -352,14 +375,19 @@ impl Clocks {
         self.nodes.iter().find(|node| node.station == station)
     }
 
-    /// The SubDevice with a station address, to be changed.
-    pub(in crate::segment) fn node_at_mut(&mut self, station: StationAddress) -> Option<&mut Node> {
-        self.nodes.iter_mut().find(|node| node.station == station)
+    /// The SubDevice with a key; `None` if it has lost its registers since.
+    pub fn node_of(&self, key: ClockKey) -> Option<&Node> {
+        self.node_at(key.station).filter(|node| node.key() == key)
     }
 
-    /// Station addresses, by position of the scan, then of later ones.
-    pub fn stations(&self) -> Vec<StationAddress> {
-        self.nodes.iter().map(|node| node.station).collect()
+    /// The same, to be changed.
+    pub(in crate::segment) fn node_of_mut(&mut self, key: ClockKey) -> Option<&mut Node> {
+        self.nodes.iter_mut().find(|node| node.key() == key)
+    }
+
+    /// Keys, by position of the scan, then of later ones.
+    pub fn keys(&self) -> Vec<ClockKey> {
+        self.nodes.iter().map(Node::key).collect()
     }
 
     /// The declared passage times of a SubDevice.
@@ -371,11 +399,13 @@ impl Clocks {
     }
 
     /// Clocks whose DC_LATCH_MODE differs from the setting that these entry ports need (protocol 3.12, 7.5).
-    pub fn latch_modes(&self, stations: &[StationAddress], entries: &[u8]) -> Vec<(StationAddress, bool)> {
+    pub fn latch_modes(&self, stations: &[StationAddress], entries: &[u8]) -> Vec<(ClockKey, bool)> {
         let wanted = stations.iter().zip(entries).map(|(station, entry)| (*station, *entry != 0));
-        let is_other = |(station, backwards): &(StationAddress, bool)| {
-            self.node_at(*station).is_some_and(|node| node.has_clock && node.latches_backwards != *backwards)
+        let is_other = |node: &&Node, backwards: bool| node.has_clock && node.latches_backwards != backwards;
+        let other = |(station, backwards): (StationAddress, bool)| {
+            let node = self.node_at(station).filter(|node| is_other(node, backwards))?;
+            Some((node.key(), backwards))
         };
-        wanted.filter(is_other).collect()
+        wanted.filter_map(other).collect()
     }
 }

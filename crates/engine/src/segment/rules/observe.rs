@@ -1,10 +1,13 @@
 //! Dispatch of observations.
 
-use alloc::vec::Vec;
+use alloc::vec;
+use core::time::Duration;
 
+use super::findings::report_comparison;
 use crate::event::Event;
 use crate::ring::FrameLimit;
 use crate::ring_status::CableErrors;
+use crate::segment::cable_watch::CableWatch;
 use crate::segment::effect::Effects;
 use crate::segment::model::Segment;
 use crate::segment::observation::Observation;
@@ -12,6 +15,10 @@ use crate::segment::ring::{Cabled, Words};
 use crate::segment::versions::Versions;
 use crate::segment::wake::Wake;
 use crate::time::Instant;
+
+/// Pause between two tests of the number of datagrams per frame. Long frames delay a cycle, so there is a pause
+/// whatever else disturbs the segment.
+const FRAME_TESTS: Duration = Duration::from_secs(10);
 
 impl Segment {
     /// Processes an observation. The effects must be executed in their order.
@@ -37,11 +44,11 @@ impl Segment {
             RoundEnded(number) => self.attention.end(number, now),
             RoundWanted => self.attention.want(),
             RoundWantedIn(pause) => self.attention.again_in(pause, now),
-            FramesTested(until) => self.frames_tested_until = until,
-            FramesLimited(limit) => self.limit_frames(limit, effects),
+            FramesTested => self.frames_tested_until = now + FRAME_TESTS,
+            FramesLimited { versions, limit } => self.limit_frames(versions, limit, effects),
             ScanBegun => self.begin_scan(true),
-            ScanShows(findings) => self.report_findings(findings, effects),
-            Compared(event) => effects.report(event),
+            ScanShows { findings, subdevices } => self.report_scan(findings, subdevices, effects),
+            Compared(finding) => report_comparison(finding, effects),
             ScanEnded(result) => self.end_scan(result, effects),
             FoundAgain { versions, found } => self.find_again(versions, found),
             Activated(declared) => self.activate(*declared, effects),
@@ -62,7 +69,7 @@ impl Segment {
             Readdressing(old) => self.observe_readdressing(old),
             Offered(station) => self.addresses.offered(station),
             Given { versions, view, given } => self.observe_given(versions, view, given, now, effects),
-            Searched(result) => self.observe_search(result, effects),
+            Searched { versions, result } => self.observe_search(versions, result, effects),
             Read { key, read } => self.observe_read(key, read, effects),
             Unexpected(key) => self.observe_unexpected(key, effects),
             Misfit { key, index, attempt, reason } => self.observe_misfit(key, (index, attempt), reason, effects),
@@ -72,7 +79,7 @@ impl Segment {
             Rescanned { versions, seen, words } => self.adopt(versions, seen, &words, effects),
             GroupsFollowed(changes) => self.hot_connect.follow(changes),
             Moved { versions, moved } => self.observe_moved(versions, moved, effects),
-            CableErrors { versions, fresh, rising } => self.observe_cable_errors(versions, (fresh, rising), effects),
+            CableErrors { versions, fresh } => self.observe_cable_errors(versions, fresh, now, effects),
             Clocks(seen) => self.observe_clocks(seen, now, effects),
             Wanted(wanted) => self.slot.want(wanted),
             Undisturbed(number) => self.slot.end(number),
@@ -87,25 +94,29 @@ impl Segment {
         }
     }
 
-    fn limit_frames(&mut self, limit: FrameLimit, effects: &mut Effects) {
+    fn limit_frames(&mut self, versions: Versions, limit: FrameLimit, effects: &mut Effects) {
+        if versions.cabling != self.cabling.version || !self.was_all_in_reach(versions.isolations) {
+            return;
+        }
         self.frames_tested_until = Instant::NEVER;
         effects.report(Event::FrameLimit { limit });
     }
 
-    fn observe_cable_errors(
-        &mut self,
-        versions: Versions,
-        (fresh, rising): (&[CableErrors], Vec<Event>),
-        effects: &mut Effects,
-    ) {
+    fn observe_cable_errors(&mut self, versions: Versions, fresh: &[CableErrors], now: Instant, effects: &mut Effects) {
         // If the cabling was replaced since, the counts belong to other cables.
         if versions.cabling != self.cabling.version {
             return;
         }
-        for ((_, total), fresh) in self.cabling.cables.iter_mut().zip(fresh) {
-            *total = total.plus(*fresh);
+        let cables = &mut self.cabling.cables;
+        if self.cable_watches.0 != versions.cabling || self.cable_watches.1.len() != cables.len() {
+            self.cable_watches = (versions.cabling, vec![CableWatch::default(); cables.len()]);
         }
-        rising.into_iter().for_each(|event| effects.report(event));
+        for (((cable, total), fresh), watch) in cables.iter_mut().zip(fresh).zip(&mut self.cable_watches.1) {
+            *total = total.plus(*fresh);
+            if let Some(errors) = watch.take(*fresh, now) {
+                effects.report(Event::CableErrors { cable: *cable, errors });
+            }
+        }
     }
 
     fn observe_words(&mut self, words: &Words, now: Instant, effects: &mut Effects) {

@@ -2,7 +2,6 @@
 
 use alloc::rc::Rc;
 use alloc::string::{String, ToString};
-use alloc::vec::Vec;
 
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
@@ -24,13 +23,6 @@ impl Segment {
             self.subdevices = SubDevices::default();
             self.stage = Stage::Scanning { is_requested };
             (self.idle.compared, self.idle.counted) = (Comparison::Open, None);
-        }
-    }
-
-    /// What the scan under way has found.
-    pub(in crate::segment) fn report_findings(&self, findings: Vec<Event>, effects: &mut Effects) {
-        if self.is_scanning() {
-            findings.into_iter().for_each(|event| effects.report(event));
         }
     }
 
@@ -142,6 +134,7 @@ impl Segment {
     /// Begins a stage. Nothing of the last declaration remains; findings that were requested before are refused.
     fn begin(&mut self, stage: Stage, mut declared: Declared) {
         declared.cabling.version = self.cabling.version.wrapping_add(1);
+        declared.clocks.changes = self.clocks.changes.of_next();
         let mut addresses = core::mem::take(&mut self.addresses);
         let first_attempt = self.subdevices.next_attempt(self.first_attempt);
         let mut keeping = core::mem::take(&mut self.keeping);

@@ -102,7 +102,15 @@ impl Segment {
     }
 
     /// A search for SubDevices without a known address has ended.
-    pub(in crate::segment) fn observe_search(&mut self, result: Result<(), String>, effects: &mut Effects) {
+    pub(in crate::segment) fn observe_search(
+        &mut self,
+        versions: Versions,
+        result: Result<(), String>,
+        effects: &mut Effects,
+    ) {
+        if result.is_err() && !self.are_places_valid(versions) {
+            return;
+        }
         let is_due = self.addresses.searched(result.is_ok());
         if let Err(reason) = result
             && is_due

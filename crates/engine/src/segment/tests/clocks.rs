@@ -1,10 +1,12 @@
 //! Clocks: from measured, written and read values to events, references and the next measurement.
 
+mod stale;
+
 use crate::board::clocks::References;
 use crate::clocks::Delays;
 use crate::clocks::Measured;
 use crate::config::ClockConfig;
-use crate::segment::clocks::{Answer, ClockObservation, Difference, Due};
+use crate::segment::clocks::{Answer, ClockFinding, ClockKey, ClockObservation, ClockVersions, Difference, Due, Node};
 
 use super::*;
 
@@ -14,11 +16,11 @@ fn set_up(count: usize) -> Ring {
     let measured = measured(count, 100);
     let effects = ring.clocks(ClockObservation::SetUpBegun);
     assert_eq!(effects, []);
-    ring.clocks(ClockObservation::Measured(&measured));
-    let effects = ring.clocks(ClockObservation::SetUp);
+    ring.finds(ClockFinding::Measured(&measured));
+    let effects = ring.finds(ClockFinding::SetUp);
     assert_eq!(reports(&effects), [Event::ReferenceClock { position: Some(Position(0)) }]);
     assert!(effects.contains(&Effect::Start(Task::CompensateDrift)));
-    ring.clocks(ClockObservation::Compensated);
+    ring.finds(ClockFinding::Compensated);
     ring
 }
 
@@ -54,10 +56,40 @@ impl Ring {
         self.observe(Observation::Clocks(seen))
     }
 
+    fn finds_of(&mut self, versions: ClockVersions, finding: ClockFinding<'_>) -> Vec<Effect> {
+        self.clocks(ClockObservation::Found(versions, finding))
+    }
+
+    /// A finding that was asked for just now.
+    fn finds(&mut self, finding: ClockFinding<'_>) -> Vec<Effect> {
+        let versions = self.segment.clock_versions();
+        self.finds_of(versions, finding)
+    }
+
     fn answers(&mut self, answers: &[Option<Answer>]) -> Vec<Event> {
-        let answered = |(index, answer): (usize, &Option<Answer>)| Some((station(index), (*answer)?));
-        let answers = &answers.iter().enumerate().filter_map(answered).collect();
-        reports(&self.clocks(ClockObservation::Answers { answers, is_explained: true, holds: 0 }))
+        let versions = self.segment.clock_versions();
+        self.answers_of(versions, answers)
+    }
+
+    fn answers_of(&mut self, versions: ClockVersions, answers: &[Option<Answer>]) -> Vec<Event> {
+        let answered = |(node, answer): (&Node, &Option<Answer>)| Some((node.key(), (*answer)?));
+        let answers = &self.segment.clocks().nodes.iter().zip(answers).filter_map(answered).collect();
+        reports(&self.finds_of(versions, ClockFinding::Answers { answers, is_explained: true }))
+    }
+
+    fn key(&self, index: usize) -> ClockKey {
+        self.node(index).key()
+    }
+
+    fn node(&self, index: usize) -> &Node {
+        self.segment.clocks().node_at(station(index)).unwrap()
+    }
+
+    /// A clock shows another offset than the written one.
+    fn loses_registers(&mut self, index: usize) {
+        let (key, written_ns) = (self.key(index), self.node(index).offset_ns);
+        let read = !(written_ns as u32);
+        self.finds(ClockFinding::OffsetRead { key, written_ns, read });
     }
 
     fn references(&self) -> References {
@@ -85,17 +117,17 @@ fn differences_during_the_drift_compensation_lock_nothing() {
     assert_eq!(ring.clocks(ClockObservation::TimeWanted), [], "one at a time");
     let good = [answer(Link::Main, 0); 2];
     (0..10).for_each(|_| assert_eq!(ring.answers(&good), []));
-    ring.clocks(ClockObservation::Compensated);
+    ring.finds(ClockFinding::Compensated);
     assert_eq!((0..3).flat_map(|_| ring.answers(&good)).count(), 1);
 }
 
 #[test]
 fn a_set_up_that_fails_is_reported_once_until_the_segment_changes() {
     let mut ring = declared(2);
-    let mut failed = |reason: &str| reports(&ring.clocks(ClockObservation::SetUpFailed(reason.into()))).len();
+    let mut failed = |reason: &str| reports(&ring.finds(ClockFinding::SetUpFailed(reason.into()))).len();
     assert_eq!([failed("a"), failed("a"), failed("b"), failed("b")], [1, 0, 1, 0]);
     ring.clocks(ClockObservation::SegmentChanged);
-    assert_eq!(reports(&ring.clocks(ClockObservation::SetUpFailed("b".into()))).len(), 1);
+    assert_eq!(reports(&ring.finds(ClockFinding::SetUpFailed("b".into()))).len(), 1);
     assert!(!ring.segment.clocks().are_set_up());
 }
 
@@ -110,8 +142,8 @@ fn a_link_change_needs_two_answers_and_gives_both_links_references() {
     // Delays that had the first clock as origin have the third one there.
     assert_eq!((ring.segment.clocks().due(), ring.references()), (Due::Delays, References::default()));
     assert_eq!(ring.segment.clocks().unwritten(), [Link::Redundant]);
-    ring.clocks(ClockObservation::DelaysWritten(Link::Redundant));
-    ring.clocks(ClockObservation::Followed { holds: 0 });
+    ring.finds(ClockFinding::DelaysWritten(Link::Redundant));
+    ring.finds(ClockFinding::Followed);
     assert_eq!(ring.references().redundant, Some(station(2)));
     assert_eq!(ring.segment.clocks().due(), Due::Filters);
 }
@@ -129,13 +161,13 @@ fn delays_that_could_not_be_written_are_written_after_the_next_measurement() {
     let mut ring = set_up(3);
     ring.clocks(ClockObservation::SegmentChanged);
     let now = measured(3, 300);
-    ring.clocks(ClockObservation::MeasuredAgain(&now));
+    ring.finds(ClockFinding::MeasuredAgain(&now));
     assert_eq!(ring.references(), References::default(), "no time is distributed meanwhile");
     // The bus fails before they are written; the next measurement gives the same delays.
-    ring.clocks(ClockObservation::MeasuredAgain(&now));
+    ring.finds(ClockFinding::MeasuredAgain(&now));
     assert_eq!(ring.segment.clocks().unwritten(), [Link::Main]);
-    ring.clocks(ClockObservation::DelaysWritten(Link::Main));
-    let ended = ring.clocks(ClockObservation::MeasurementEnded { failed: None, holds: 0 });
+    ring.finds(ClockFinding::DelaysWritten(Link::Main));
+    let ended = ring.finds(ClockFinding::MeasurementEnded { failed: None });
     assert_eq!(reports(&ended), [Event::DelaysChanged { clocks: 2, largest_ns: 400 }]);
     assert_eq!(ring.references().main, Some(station(0)));
     assert_eq!(ring.segment.clocks().doubtful_since(), None);
@@ -146,9 +178,9 @@ fn a_clock_that_lost_its_registers_is_no_reference_and_starts_a_measurement() {
     let mut ring = set_up(2);
     assert_eq!(ring.segment.clocks().doubtful_since(), None);
     ring.now = Instant(7_000_000);
-    ring.clocks(ClockObservation::RegistersLost(station(0)));
+    ring.loses_registers(0);
     assert_eq!(ring.segment.clocks().doubtful_since(), Some(ring.now));
     assert_eq!(ring.segment.clocks().reference, None);
-    let ended = ring.clocks(ClockObservation::MeasurementEnded { failed: None, holds: 0 });
+    let ended = ring.finds(ClockFinding::MeasurementEnded { failed: None });
     assert_eq!(reports(&ended), [Event::ReferenceClock { position: Some(Position(1)) }]);
 }

@@ -5,6 +5,7 @@ use alloc::string::String;
 use ringcat_wire::sii::Identity;
 
 use crate::info::SiiExtent;
+use crate::ring::FrameLimit;
 use crate::segment::unassigned::UnassignedView;
 use crate::segment::view::View;
 
@@ -306,8 +307,7 @@ fn cable_errors_moves_and_missing_inputs_from_before_a_change_are_not_reported()
         let attempt = ring.member(0).attempt;
         ring.observe(of_member((0, attempt), MemberFinding::ProcessData(ProcessDataStep::Mapped)));
         let (versions, mapping) = (ring.segment.versions(), ring.member(0).mapping);
-        let (cable, _) = ring.segment.cabling.cables[0];
-        let rising = vec![Event::CableErrors { cable, errors: CableErrors::default() }];
+        let fresh = [CableErrors { invalid_frames: 3, lost_links: 0 }];
         if is_stale {
             recable(&mut ring);
             ring.observe(Observation::Readdressing(&[]));
@@ -315,7 +315,7 @@ fn cable_errors_moves_and_missing_inputs_from_before_a_change_are_not_reported()
         }
         let missing = Observation::NotProven { index: 0, mapping, what: "no inputs".into() };
         let shown = [
-            ring.observe(Observation::CableErrors { versions, fresh: &[], rising }),
+            ring.observe(Observation::CableErrors { versions, fresh: &fresh }),
             ring.observe(Observation::Moved { versions, moved: moved() }),
             ring.observe(missing),
         ];
@@ -333,8 +333,9 @@ fn what_a_scan_has_found_is_not_reported_after_it_was_given_up() {
         if is_given_up {
             ring.observe(Observation::Deactivated);
         }
-        let effects = ring.observe(Observation::ScanShows(vec![Event::ScanFinished { subdevices: 2 }]));
-        assert_eq!(reports(&effects).len(), usize::from(!is_given_up), "given up: {is_given_up}");
+        let effects = ring.observe(Observation::ScanShows { findings: Vec::new(), subdevices: 2 });
+        let shown = if is_given_up { vec![] } else { vec![Event::ScanFinished { subdevices: 2 }] };
+        assert_eq!(reports(&effects), shown, "given up: {is_given_up}");
     }
 }
 
@@ -351,19 +352,69 @@ fn temporary_addresses_are_used_in_turn_and_without_those_in_use() {
     assert_eq!(next(&mut ring), 0xC000, "0xFFFF is no station address");
 }
 
+fn searched(ring: &mut Ring, result: Result<(), String>) -> Vec<Effect> {
+    let versions = ring.segment.versions();
+    ring.observe(Observation::Searched { versions, result })
+}
+
+#[test]
+fn a_search_that_failed_on_another_segment_does_not_count() {
+    let changes: [fn(&mut Ring); 2] = [
+        |ring| drop(ring.observe(Observation::Readdressing(&[station(1)]))),
+        |ring| {
+            isolate(ring, 0);
+            ring.observe(Observation::Undisturbed(0));
+        },
+    ];
+    for (number, change) in changes.into_iter().enumerate() {
+        let mut ring = Ring::closed(3);
+        let failed = |ring: &mut Ring, versions| {
+            for _ in 0..3 {
+                ring.observe(Observation::Searched { versions, result: Err(String::new()) });
+            }
+            ring.segment.are_frames_doubtful()
+        };
+        let versions = ring.segment.versions();
+        change(&mut ring);
+        assert!(!failed(&mut ring, versions), "change {number}");
+        let versions = ring.segment.versions();
+        assert!(failed(&mut ring, versions), "change {number}");
+        // That all are known counts in any case.
+        change(&mut ring);
+        ring.observe(Observation::Searched { versions, result: Ok(()) });
+        assert!(!ring.segment.are_frames_doubtful(), "change {number}");
+    }
+}
+
+#[test]
+fn the_limit_of_frames_of_another_segment_is_not_reported_and_the_test_is_repeated() {
+    let limit = FrameLimit { datagrams: 15, returns: true };
+    for is_stale in [false, true] {
+        let mut ring = Ring::closed(3);
+        let versions = ring.segment.versions();
+        ring.observe(Observation::FramesTested);
+        assert_eq!(ring.segment.next_frame_test(), ring.now + Duration::from_secs(10));
+        if is_stale {
+            recable(&mut ring);
+        }
+        let effects = ring.observe(Observation::FramesLimited { versions, limit });
+        assert_eq!(reports(&effects), if is_stale { vec![] } else { vec![Event::FrameLimit { limit }] });
+        assert_eq!(ring.segment.next_frame_test() == Instant::NEVER, !is_stale);
+    }
+}
+
 #[test]
 fn searches_that_fail_repeatedly_test_the_frames_and_are_reported_once() {
     let mut ring = Ring::closed(3);
     let mut failed = |count: usize| -> Vec<Event> {
-        let failure = || Observation::Searched(Err(String::from("a reason")));
-        (0..count).flat_map(|_| reports(&ring.observe(failure()))).collect()
+        (0..count).flat_map(|_| reports(&searched(&mut ring, Err(String::from("a reason"))))).collect()
     };
     assert_eq!(failed(99), []);
     assert_eq!(failed(2), [Event::ScanFailed { reason: "a reason".into() }]);
-    ring.observe(Observation::Searched(Ok(())));
+    searched(&mut ring, Ok(()));
     let doubts: Vec<bool> = (0..4)
         .map(|_| {
-            ring.observe(Observation::Searched(Err(String::new())));
+            searched(&mut ring, Err(String::new()));
             ring.segment.are_frames_doubtful()
         })
         .collect();

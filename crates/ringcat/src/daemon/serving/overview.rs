@@ -24,13 +24,11 @@ pub fn overview(supervisor: &SupervisorThread) -> Result<SegmentOverview, Error>
     let (ring, activity, found) = asked?;
     let read = RawDatagram::new(Command::Brd, Target::Broadcast(map::AL_STATUS), [0; 2]);
     let replies = supervisor.datagrams(vec![read.with_resend(true)]).unwrap_or_default();
-    let mut seen = SegmentOverview {
-        is_ring: ring.redundancy != Redundancy::None,
-        found: u32::try_from(found).unwrap_or(u32::MAX),
-        is_scanned: matches!(activity, Activity::Scanned | Activity::Active),
-        scans: activity == Activity::Scanning,
-        ..SegmentOverview::default()
-    };
+    let mut seen = SegmentOverview::default();
+    seen.is_ring = ring.redundancy != Redundancy::None;
+    seen.found = u32::try_from(found).unwrap_or(u32::MAX);
+    seen.is_scanned = matches!(activity, Activity::Scanned | Activity::Active);
+    seen.scans = activity == Activity::Scanning;
     if let Some(Ok(reply)) = replies.first() {
         seen.counts = [reply.main.0, reply.redundant.0];
         seen.al_states = reply.data.first().copied().unwrap_or(0) & AL_STATES;

@@ -2,11 +2,10 @@
 
 use alloc::vec::Vec;
 
-use crate::board::clocks::References;
 use crate::clocks::SyncWindow;
 use crate::event::Event;
 use crate::link::Link;
-use crate::segment::clocks::{Answers, Delays, Difference, Due, Life, Lock, Node, Running};
+use crate::segment::clocks::{Answers, Difference, Lock, Node, Running};
 use crate::segment::effect::Effects;
 use crate::segment::model::Segment;
 use crate::time::Instant;
@@ -56,7 +55,7 @@ impl Segment {
     /// The difference and the deviation of each clock; differences that contain the jitter of the host as a mean.
     fn differences(&mut self, answers: &Answers) -> Vec<(Option<i32>, i64)> {
         let difference = |node: &mut Node| {
-            let Some(answer) = answers.get(&node.station) else { return (None, 0) };
+            let Some(answer) = answers.get(&node.key()) else { return (None, 0) };
             let difference = match answer.difference {
                 Difference::Unknown => None,
                 Difference::Own(ns) => Some(ns),
@@ -108,23 +107,9 @@ impl Segment {
         }
         if Link::ALL.iter().any(|link| self.clocks.is_mixed(*link)) {
             // Delays across the two parts are unknown until the segment has been measured.
-            if let Life::Running(Running { delays: delays @ Delays::Valid, .. }) = &mut self.clocks.life {
-                *delays = Delays::Doubtful(now);
-            }
-            return;
+            return self.doubt(now);
         }
-        let changed: Vec<Link> = Link::ALL.into_iter().filter(|link| self.clocks.refer(*link)).collect();
-        let Some(running) = self.clocks.running_mut() else { return };
-        for link in changed {
-            running.unwritten.links[link.index()] = true;
-        }
-        if running.unwritten.links.contains(&true) {
-            running.due = Due::Delays;
-            // No time is distributed while delays have different origins.
-            self.board.clocks.post_references(References::default());
-        } else {
-            self.follow(holds);
-        }
+        self.write_or_follow(holds);
     }
 
     /// Takes over the links of the answers; returns whether any has changed. `None` if the next answers must confirm
@@ -132,21 +117,22 @@ impl Segment {
     fn confirm_links(&mut self, answers: &Answers) -> Option<bool> {
         let before = self.clocks.running_mut()?.unconfirmed.take();
         let is_certain = |node: &Node| {
-            let Some(answer) = answers.get(&node.station).filter(|_| node.has_clock) else { return true };
+            let Some(answer) = answers.get(&node.key()).filter(|_| node.has_clock) else { return true };
             let is_confirmed = || before.as_ref()?.get(&node.station).map(|link| *link == answer.link);
             answer.link == node.link || is_confirmed() == Some(true)
         };
         if !self.clocks.nodes.iter().all(is_certain) {
-            let links = answers.iter().map(|(station, answer)| (*station, answer.link)).collect();
+            let links = answers.iter().map(|(key, answer)| (key.station, answer.link)).collect();
             self.clocks.running_mut()?.unconfirmed = Some(links);
             return None;
         }
         let mut moved = false;
         for node in self.clocks.nodes.iter_mut().filter(|node| node.has_clock) {
-            let Some(answer) = answers.get(&node.station) else { continue };
+            let Some(answer) = answers.get(&node.key()) else { continue };
             moved |= answer.link != node.link;
             node.link = answer.link;
         }
+        self.clocks.changes.delays = self.clocks.changes.delays.wrapping_add(u32::from(moved));
         Some(moved)
     }
 }

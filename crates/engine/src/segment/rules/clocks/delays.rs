@@ -25,6 +25,7 @@ impl Clocks {
     /// Takes over a measurement: the link of each SubDevice and its delay from the reference on that link.
     pub(super) fn take_over(&mut self, measured: &Measured) {
         self.measured = self.measured.wrapping_add(1);
+        self.changes.delays = self.changes.delays.wrapping_add(1);
         self.last = Some(measured.clone());
         let are_estimated = self.config.estimated_delays;
         let positions: Vec<(StationAddress, usize)> =
@@ -103,14 +104,16 @@ impl Clocks {
             changed |= node.delay_ns != delay;
             node.delay_ns = delay;
         }
+        self.changes.delays = self.changes.delays.wrapping_add(u32::from(changed));
         changed
     }
 
     /// Computes the offsets with which all clocks show `wanted` where the frame enters the segment, plus their delay.
     pub(super) fn set_offsets(&mut self, latched: &LatchedTimes, wanted: u64) {
+        self.changes.offsets = self.changes.offsets.wrapping_add(1);
         let references = Link::ALL.map(|link| self.reference_on(link).and_then(|reference| reference.unit));
         for node in &mut self.nodes {
-            let Some(latched) = latched.get(&node.station) else { continue };
+            let Some(latched) = latched.get(&node.key()) else { continue };
             // Without a delay it shows the received time: the time at which the frame passes the reference.
             let received = || references[usize::from(node.link == Some(Link::Redundant))];
             let unit = node.unit.or_else(received).map_or(0, round);
@@ -121,15 +124,17 @@ impl Clocks {
     /// The offset of one clock, from a frame that it and its reference have latched; from the time of the host without
     /// a reference.
     pub(super) fn set_offset(&mut self, station: StationAddress, latched: &LatchedTimes, host: u64) {
-        let time = |station: StationAddress| latched.get(&station).map(|latched| latched.unit);
-        let (Some(own), Some(node)) = (time(station), self.node_at(station)) else { return };
+        let time = |node: &Node| latched.get(&node.key()).map(|latched| latched.unit);
+        let Some(node) = self.node_at(station) else { return };
+        let Some(own) = time(node) else { return };
         let reference = self.reference_on(node.link.unwrap_or(Link::Main));
         let reference = reference.filter(|reference| reference.station != station);
-        let system = match reference.and_then(|reference| Some((reference, time(reference.station)?))) {
+        let system = match reference.and_then(|reference| Some((reference, time(reference)?))) {
             Some((reference, local)) => local.wrapping_add_signed(reference.offset_ns),
             None => host.wrapping_add(self.epoch),
         };
-        let Some(node) = self.node_at_mut(station) else { return };
+        let key = node.key();
+        let Some(node) = self.node_of_mut(key) else { return };
         node.offset_ns = system.wrapping_add_signed(node.delay_ns).wrapping_sub(own) as i64;
         (node.good, node.difference_ns, node.average, node.worst_ns) = (0, None, None, 0);
     }

@@ -1,11 +1,9 @@
 //! Effects of the time that the application gives.
 
-use ringcat_wire::address::StationAddress;
-
 use crate::board::clocks::References;
 use crate::clocks::extend;
 use crate::event::Event;
-use crate::segment::clocks::{ClockObservation, Delays, Due, Life, Running, Step, Unwritten};
+use crate::segment::clocks::{ClockKey, ClockVersions, Delays, Due, Life, Running, Step, Unwritten};
 use crate::segment::effect::Effects;
 use crate::segment::model::Segment;
 
@@ -14,24 +12,24 @@ impl Segment {
     pub(super) fn observe_begun_set_up(&mut self) {
         let first = self.board.clocks.times.first_epoch();
         self.clocks.epoch = self.clocks.times.begin(first).unwrap_or(self.clocks.epoch);
-        self.clocks.reference = self.clocks.elect(|_| true);
+        self.clocks.changes.set_ups = self.clocks.changes.set_ups.wrapping_add(1);
+        let reference = self.clocks.elect(|_| true);
+        self.clocks.refer_to(reference);
     }
 
-    /// Processes an observation of offsets that were changed, or of the time of the reference.
-    pub(super) fn observe_time(&mut self, seen: ClockObservation<'_>, effects: &mut Effects) {
-        match seen {
-            ClockObservation::OffsetsWritten { missed } => self.observe_written_offsets(missed, effects),
-            ClockObservation::SlideBegun => {
-                self.clocks.times.take_shift_in_effect(self.board.clocks.times.wanted());
-            }
-            ClockObservation::SteppingBack(step_ns) => self.observe_step_back(step_ns),
-            ClockObservation::SteppedBack { missed } => self.observe_stepped_back(missed),
-            ClockObservation::ReferenceTime { low, sent_at } => {
-                let near = sent_at.wrapping_add(self.clocks.epoch);
-                self.clocks.epoch = extend(low, near).wrapping_sub(sent_at);
-                self.compare_times(effects);
-            }
-            _ => debug_assert!(false, "it is an observation of another kind"),
+    /// The time of the reference was read. It is refused if another clock is the reference by now, or after a change of
+    /// all offsets.
+    pub(super) fn observe_reference_time(
+        &mut self,
+        (key, low, sent_at): (ClockKey, u32, u64),
+        versions: &ClockVersions,
+        effects: &mut Effects,
+    ) {
+        let is_reference = self.clocks.reference_node().is_some_and(|node| node.key() == key);
+        if is_reference && self.are_offsets_as_in(versions) {
+            let near = sent_at.wrapping_add(self.clocks.epoch);
+            self.clocks.epoch = extend(low, near).wrapping_sub(sent_at);
+            self.compare_times(effects);
         }
     }
 
@@ -64,26 +62,33 @@ impl Segment {
     fn begin_jump(&mut self, jump: u64) {
         self.board.clocks.post_references(References::default());
         self.clocks.epoch = self.clocks.epoch.wrapping_add(jump);
+        self.clocks.changes.offsets = self.clocks.changes.offsets.wrapping_add(1);
         for node in &mut self.clocks.nodes {
             node.offset_ns = node.offset_ns.wrapping_add(jump as i64);
         }
         self.clocks.times.turn(jump, (0, 0), self.clocks.epoch);
-        if let Some(running) = self.clocks.running_mut() {
-            running.due = Due::Offsets;
-        }
+        self.set_due(Due::Offsets);
     }
 
-    fn observe_written_offsets(&mut self, missed: &[StationAddress], effects: &mut Effects) {
+    /// The offsets of a jump are written, unless they have changed again meanwhile. A clock that did not answer is set
+    /// up when it does.
+    pub(super) fn observe_written_offsets(
+        &mut self,
+        missed: &[ClockKey],
+        versions: &ClockVersions,
+        effects: &mut Effects,
+    ) {
+        if !self.are_offsets_as_in(versions) {
+            return;
+        }
         for node in self.clocks.nodes.iter_mut().filter(|node| node.has_clock) {
-            node.missed_offset |= node.link.is_none() || missed.contains(&node.station);
+            node.missed_offset |= node.link.is_none() || missed.contains(&node.key());
         }
         let timeline = self.clocks.times.timeline;
         let before = self.board.clocks.times.timeline().jumped;
         self.board.clocks.times.post_timeline(timeline);
         self.board.clocks.post_references(self.clocks.references());
-        if let Some(running) = self.clocks.running_mut() {
-            running.due = Due::Filters;
-        }
+        self.set_due(Due::Filters);
         effects.report(Event::ApplicationTime {
             jump_ns: timeline.jumped.wrapping_sub(before) as i64,
             shift_ns: timeline.shift as i64,
@@ -91,9 +96,10 @@ impl Segment {
     }
 
     /// The system time of all clocks goes back by a step: their offsets are about to be written.
-    fn observe_step_back(&mut self, step_ns: u64) {
+    pub(super) fn observe_step_back(&mut self, step_ns: u64) {
         self.clocks.times.slide(step_ns);
         self.clocks.epoch = self.clocks.epoch.wrapping_sub(step_ns);
+        self.clocks.changes.offsets = self.clocks.changes.offsets.wrapping_add(1);
         for node in &mut self.clocks.nodes {
             node.offset_ns = node.offset_ns.wrapping_sub(step_ns as i64);
         }
@@ -102,9 +108,9 @@ impl Segment {
     }
 
     /// The offsets of a step are written. A clock that did not answer is set up when it does.
-    fn observe_stepped_back(&mut self, missed: &[StationAddress]) {
+    pub(super) fn observe_stepped_back(&mut self, missed: &[ClockKey]) {
         for node in self.clocks.nodes.iter_mut().filter(|node| node.has_clock) {
-            node.missed_offset |= node.link.is_none() || missed.contains(&node.station);
+            node.missed_offset |= node.link.is_none() || missed.contains(&node.key());
         }
     }
 }
