@@ -63,13 +63,14 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
     let Access { interfaces, supervisor, mut cyclic, mut surroundings, recording, tenure, awake: _awake } = access;
     let begin = now();
     let beside = arguments.beside.start(&supervisor, &interfaces)?;
-    let scan = match tenure.scan() {
+    let mut scan = match tenure.scan() {
         Some(scan) => scan,
         None => scan(&supervisor, &mut cyclic, &mut surroundings, begin)?,
     };
-    let names = match &network {
-        Some(network) => network.names(),
-        None => Names(scan.subdevices.iter().map(|info| info.name.clone()).collect()),
+    let described = arguments.esi.complete(&mut scan.subdevices, &[])?;
+    let (names, objects) = match &network {
+        Some(network) => (network.names(), network.objects(&scan.subdevices, described)),
+        None => (Names(scan.subdevices.iter().map(|info| info.name.clone()).collect()), described),
     };
     let declaration = arguments.declared.declare(network.as_ref(), &scan.subdevices)?;
     let declaration = arguments.resend.adapt(declaration.with_under_way(arguments.under_way.under_way));
@@ -84,7 +85,8 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
     let application = activate(arguments, network.as_ref(), supervisor, declaration, cyclic)?;
     let (cycles, watched, sent_once, jobs) = start_cycles(arguments, network.as_ref(), application, &names, &end)?;
     let ring = interfaces.links.redundant.is_some();
-    let log = RunLog::new(begin, EventLog::new(begin, names).with_every_event(arguments.all_events), surroundings);
+    let events = EventLog::new(begin, names).with_every_event(arguments.all_events);
+    let log = RunLog::new(begin, events, surroundings).with_objects(objects);
     let mut run = Run { cycles, log, live: Live::new(ring, clocks), clocks, domains, beside, watched, recording };
     let reached = run.reach_op(arguments.within, &end);
     let before = Seen::of(run.cycles.cyclic_status());

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use clap::Args;
 use ringcat::Directory;
-use ringcat::config::{Configuration, Variable};
+use ringcat::config::{Configuration, ObjectNames, Variable};
 use ringcat::eni::{EniFile, EniImage, EniVariable, Value, VariableType};
 use ringcat::network::{LoadedNetwork, NetworkFile};
 use ringcat::text::Names;
@@ -154,6 +154,21 @@ impl ConfiguredNetwork {
     /// Names of the SubDevices.
     pub fn names(&self) -> Names {
         Names(self.configuration().names())
+    }
+
+    /// Names of the objects of each SubDevice: those of a network file, then those of the scan.
+    pub fn objects(&self, found: &[SubDeviceInfo], described: Vec<ObjectNames>) -> Vec<ObjectNames> {
+        let described: Vec<Arc<ObjectNames>> = described.into_iter().map(Arc::new).collect();
+        let places = self.configuration().places(found).into_iter().enumerate();
+        let of = |(at, place): (usize, Option<usize>)| {
+            let mut names = ObjectNames::default();
+            if let Some(subdevice) = self.network_file().and_then(|file| file.subdevice.get(at)) {
+                names.add_declared(subdevice);
+            }
+            place.and_then(|place| described.get(place)).into_iter().for_each(|found| names.share(found.clone()));
+            names
+        };
+        places.map(of).collect()
     }
 
     /// Whether the file declares the process data of every SubDevice with all registers.
