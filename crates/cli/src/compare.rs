@@ -49,7 +49,7 @@ pub struct CompareArguments {
 struct Declared {
     configuration: Configuration,
     stated: Vec<Stated>,
-    /// Names of objects, by SubDevice; empty for an ENI, whose PDOs have no index.
+    /// Names of objects, by SubDevice.
     names: Vec<ObjectNames>,
 }
 
@@ -124,7 +124,13 @@ fn load(arguments: &CompareArguments) -> Result<Declared, Failure> {
     let path = arguments.eni.as_deref().ok_or_else(|| Failure::new("expected --eni FILE or --network FILE"))?;
     let file = EniFile::load(path).map_err(|error| Failure::new(error.to_string()))?;
     let stated = file.stated();
-    Ok(Declared { configuration: file.configuration, stated, names: Vec::new() })
+    let names = file.eni.subdevices.iter().map(|subdevice| {
+        let mut names = ObjectNames::default();
+        names.add_eni(subdevice);
+        names
+    });
+    let names = names.collect();
+    Ok(Declared { configuration: file.configuration, stated, names })
 }
 
 /// A text in lines of at most this number of characters; longer words have lines of their own.

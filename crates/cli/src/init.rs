@@ -132,13 +132,7 @@ pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
     let subdevices = file.subdevice.len();
     say!("scan {:.1} ms, file {:.1} ms", scan_us as f64 / 1e3, file_us as f64 / 1e3);
     if let Some(named) = named {
-        let described = counted(named.described, "SubDevice", "SubDevices");
-        let names = counted(named.names, "name", "names");
-        let modules = match named.modules {
-            0 => String::new(),
-            modules => format!(" with {}", counted(modules, "module", "modules")),
-        };
-        say!("{described}{modules} described, {names} from descriptions");
+        say!("{named}");
     }
     say!("digest {digest}");
     let held = format!(

@@ -15,6 +15,7 @@ mod options;
 mod pace;
 mod reasons;
 mod summary;
+pub mod watched;
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -38,7 +39,7 @@ use crate::run_log::{RunLog, name_of};
 use crate::surroundings::Surroundings;
 use crate::times::in_words;
 use crate::verdict::{Report, Verdict};
-use configured::{ConfiguredNetwork, Watched};
+use configured::ConfiguredNetwork;
 use exchange::Run;
 use jobs::Jobs;
 use live::Live;
@@ -46,6 +47,7 @@ pub use options::RunArguments;
 use pace::Seen;
 use reasons::Exchanged;
 use summary::{End, clock_account, final_account, json, summary};
+use watched::Watched;
 
 /// SubDevices have this long to get to INIT in the end.
 const STOP_LIMIT: Duration = Duration::from_secs(5);

@@ -131,7 +131,7 @@ mod tests {
         assert_eq!(name_of(&Event::InterfacesSwapped), "InterfacesSwapped");
     }
 
-    // covers: esi-names
+    // covers: esi-use
     #[test]
     fn an_object_that_a_subdevice_refuses_is_named_with_its_name() {
         let names = |name: &str| {

@@ -1,5 +1,5 @@
-//! Names of the PDOs, entries and objects of a SubDevice, for messages: those of a file of the network, of the SubDevice
-//! itself, of its description. The first source that names an object counts (`docs/sources.md`).
+//! Names of the PDOs, entries and objects of a SubDevice, for messages: those of a file of the network, of the
+//! SubDevice itself, of its description. The first source that names an object counts (`docs/sources.md`).
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use ringcat_engine::info::SubDeviceInfo;
 
+use crate::eni;
 use crate::esi::{Device, Dictionary, Object, Pdo, PlacedModule, parts};
 #[cfg(feature = "network")]
 use crate::network::model;
@@ -47,6 +48,16 @@ impl ObjectNames {
             self.add_object(pdo.index, &pdo.name);
             for entry in pdo.entries.iter().flatten() {
                 self.add_entry(entry.index, entry.sub, &entry.name);
+            }
+        }
+    }
+
+    /// Adds the names of an ENI.
+    pub fn add_eni(&mut self, subdevice: &eni::SubDevice) {
+        for pdo in subdevice.process_data.iter().flat_map(|data| &data.pdos) {
+            self.add_object(pdo.index, &pdo.name);
+            for entry in &pdo.entries {
+                self.add_entry(entry.index, entry.sub_index, &entry.name);
             }
         }
     }
@@ -215,7 +226,7 @@ mod tests {
         names
     }
 
-    // covers: esi-names
+    // covers: esi-use
     #[test]
     fn objects_in_a_message_get_their_names_and_other_numbers_do_not() {
         let names = names();
@@ -248,7 +259,7 @@ mod tests {
         }
     }
 
-    // covers: esi-names
+    // covers: esi-use
     #[test]
     fn the_first_source_counts_and_a_gap_has_no_name() {
         let names = names();

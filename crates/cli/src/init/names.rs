@@ -1,11 +1,13 @@
 //! Names of PDOs and entries from descriptions, for a network file from a scan.
 
+use std::fmt;
+
 use ringcat::network::NetworkFile;
 
 use crate::bus::Bus;
 use crate::descriptions::{Descriptions, LANGUAGE};
 use crate::failure::Failure;
-use crate::output::warn;
+use crate::output::{counted, warn};
 
 /// What came from the descriptions.
 #[derive(Clone, Copy, Debug, Default)]
@@ -16,6 +18,16 @@ pub struct Named {
     pub modules: usize,
     /// Names that were filled in.
     pub names: usize,
+}
+
+impl fmt::Display for Named {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&counted(self.described, "SubDevice", "SubDevices"))?;
+        if self.modules > 0 {
+            write!(f, " with {}", counted(self.modules, "module", "modules"))?;
+        }
+        write!(f, " described, {} from descriptions", counted(self.names, "name", "names"))
+    }
 }
 
 /// Fills in names from the description that counts for each SubDevice, and reports where both disagree.

@@ -115,7 +115,7 @@ mod tests {
         lines(&found[0], &json(&found[0], &names[0]))
     }
 
-    // covers: esi-names
+    // covers: esi-use
     #[test]
     fn pdos_are_listed_with_names_of_the_eeprom_else_of_the_description() {
         let place = Place::new();

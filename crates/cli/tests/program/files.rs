@@ -177,7 +177,7 @@ fn without_names(text: &str) -> String {
     out + rest
 }
 
-// covers: network-file, esi-names, ES-64, ES-69
+// covers: network-file, esi-use, ES-64, ES-69
 #[test]
 fn pdos_of_modules_get_their_names_by_detected_idents_or_by_their_entries() {
     let place = Place::new("modules");
@@ -205,7 +205,7 @@ fn pdos_of_modules_get_their_names_by_detected_idents_or_by_their_entries() {
     }
 }
 
-// covers: network-file, esi-names
+// covers: network-file, esi-use
 #[test]
 fn differences_name_pdos_and_entries_by_the_file_else_by_the_description() {
     let place = Place::new("compared");

@@ -8,8 +8,12 @@ use ringcat_engine::info::{PdoEntryInfo, PdoInfo};
 use super::model::{Device, Esi, Module, Pdo, PdoEntry, Slot, Slots};
 use super::modules::{PlacedModule, definitions, fits};
 
+/// Entries of the PDOs of a device by their index.
+type Found<'a> = HashMap<u16, &'a [PdoEntryInfo]>;
+
 /// The modules that a device on the bus has. `idents` are those of object 0xF050 by slot, empty where it was not read;
-/// `pdos` are the PDOs that the device describes. What no module of the description explains is left out.
+/// `pdos` are the PDOs that the device describes. Where the modules of the idents do not have these PDOs and others
+/// have, the PDOs count. What no module of the description explains is left out.
 pub fn detected_modules<'a>(
     esi: &'a Esi,
     device: &'a Device,
@@ -17,7 +21,12 @@ pub fn detected_modules<'a>(
     pdos: &[PdoInfo],
 ) -> Vec<PlacedModule<'a>> {
     let Some(slots) = &device.slots else { return Vec::new() };
-    if idents.iter().any(|ident| *ident != 0) { by_ident(esi, slots, idents) } else { by_pdos(esi, slots, pdos) }
+    let found: Found<'_> = pdos.iter().map(|pdo| (pdo.index, &pdo.entries[..])).collect();
+    let explained = |placed: &[PlacedModule<'_>]| -> usize {
+        placed.iter().filter_map(|one| pdos_there(one, &found)).map(|there| there.len()).sum()
+    };
+    let (by_ident, by_pdos) = (by_ident(esi, slots, idents), by_pdos(esi, slots, &found));
+    if !by_ident.is_empty() && explained(&by_ident) >= explained(&by_pdos) { by_ident } else { by_pdos }
 }
 
 fn by_ident<'a>(esi: &'a Esi, slots: &'a Slots, idents: &[u32]) -> Vec<PlacedModule<'a>> {
@@ -30,8 +39,7 @@ fn by_ident<'a>(esi: &'a Esi, slots: &'a Slots, idents: &[u32]) -> Vec<PlacedMod
 }
 
 /// In each slot the module with the most PDOs that are there, if it is the only one. A PDO belongs to one slot.
-fn by_pdos<'a>(esi: &'a Esi, slots: &'a Slots, pdos: &[PdoInfo]) -> Vec<PlacedModule<'a>> {
-    let found: HashMap<u16, &[PdoEntryInfo]> = pdos.iter().map(|pdo| (pdo.index, &pdo.entries[..])).collect();
+fn by_pdos<'a>(esi: &'a Esi, slots: &'a Slots, found: &Found<'_>) -> Vec<PlacedModule<'a>> {
     let mut owned: HashSet<u16> = HashSet::new();
     let mut placed = Vec::new();
     for (number, (slot, _)) in (0..).zip(definitions(slots)) {
@@ -39,7 +47,7 @@ fn by_pdos<'a>(esi: &'a Esi, slots: &'a Slots, pdos: &[PdoInfo]) -> Vec<PlacedMo
         let mut is_only = true;
         for module in esi.modules.iter().filter(|module| fits(esi, slot, module)) {
             let one = PlacedModule::new(slots, number, slot, module);
-            let Some(there) = pdos_there(&one, &found).filter(|there| !there.is_empty()) else { continue };
+            let Some(there) = pdos_there(&one, found).filter(|there| !there.is_empty()) else { continue };
             let before = best.as_ref().map_or(0, |(_, there)| there.len());
             if there.len() > before {
                 (best, is_only) = (Some((one, there)), true);
@@ -56,7 +64,7 @@ fn by_pdos<'a>(esi: &'a Esi, slots: &'a Slots, pdos: &[PdoInfo]) -> Vec<PlacedMo
 }
 
 /// The PDOs of a module that the device has in this slot; `None` where one of them has other entries.
-fn pdos_there(one: &PlacedModule<'_>, found: &HashMap<u16, &[PdoEntryInfo]>) -> Option<Vec<u16>> {
+fn pdos_there(one: &PlacedModule<'_>, found: &Found<'_>) -> Option<Vec<u16>> {
     let Module { rx_pdos, tx_pdos, .. } = one.module;
     let mut there = Vec::new();
     for pdo in rx_pdos.iter().chain(tx_pdos) {

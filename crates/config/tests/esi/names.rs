@@ -21,7 +21,7 @@ fn names(esi: &Esi, device: usize, modules: &[PlacedModule<'_>], language: u32) 
     names
 }
 
-// covers: esi-names, ES-12, ES-22
+// covers: esi-use, ES-12, ES-22
 #[test]
 fn objects_have_the_names_of_pdos_then_of_the_dictionary_in_a_language() {
     let esi = acme();
@@ -37,7 +37,7 @@ fn objects_have_the_names_of_pdos_then_of_the_dictionary_in_a_language() {
     );
 }
 
-// covers: esi-names, ES-64, ES-69
+// covers: esi-use, ES-64, ES-69
 #[test]
 fn modules_are_in_the_slots_of_the_idents_that_a_device_has_detected() {
     let esi = acme();
@@ -50,7 +50,7 @@ fn modules_are_in_the_slots_of_the_idents_that_a_device_has_detected() {
     assert_eq!(places(&detected_modules(&esi, &esi.devices[ANALOG], &[CSP], &[])), [], "it has no slots");
 }
 
-// covers: esi-names, esi-use, ES-64, ES-67
+// covers: esi-use, ES-64, ES-67
 #[test]
 fn pdos_of_modules_are_named_by_module_and_pdo_at_the_indices_of_their_slots() {
     let esi = acme();

@@ -27,11 +27,11 @@ pub struct EsiFolder {
 }
 
 impl EsiFolder {
-    /// Opens a folder with all folders in it, or a single file. `kept`: the file in which the index is kept; without one
-    /// all files are read. A file that is refused is in the index with its reason.
+    /// Opens a folder with all folders in it, or a single file. `kept`: the file in which the index is kept; without
+    /// one all files are read. A file that is refused is in the index with its reason.
     ///
     /// # Errors
-    /// The folder cannot be read.
+    /// The folder or the file cannot be read.
     pub fn open(path: &Path, kept: Option<&Path>) -> Result<EsiFolder, EsiFailure> {
         let mut found = Vec::new();
         let failed = |error| EsiFailure::Read { path: path.to_owned(), error };
