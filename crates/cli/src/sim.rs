@@ -15,6 +15,7 @@ use std::time::Duration;
 use clap::Args;
 use ringcat::eni::EniFile;
 use ringcat::esi::load_segment;
+use ringcat::network::LoadedNetwork;
 use ringcat::sim::cable::HostLink;
 use ringcat::sim::network::Network;
 use ringcat_link::{CarrierWatch, monotonic};
@@ -48,13 +49,19 @@ pub struct SimArguments {
     #[arg(long, help_heading = "Links")]
     force: bool,
     /// Segment file (see docs/segments.md)
-    #[arg(long, value_name = "FILE.toml", required_unless_present = "eni", help_heading = "Segment")]
+    #[arg(long, value_name = "FILE.toml", help_heading = "Segment")]
+    #[arg(required_unless_present_any = ["eni", "network"])]
     segment: Option<PathBuf>,
     /// Make the segment from this ENI
     ///
     /// It has the SubDevices that the file describes, and is a ring with --redundant (see docs/eni.md).
     #[arg(long, value_name = "FILE", conflicts_with = "segment", help_heading = "Segment")]
     eni: Option<PathBuf>,
+    /// Make the segment from this network file
+    ///
+    /// It has the SubDevices of the file in their order, and is a ring with --redundant (see docs/network-file.md).
+    #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["segment", "eni"], help_heading = "Segment")]
+    network: Option<PathBuf>,
     /// How long frames take
     #[arg(long, value_enum, default_value = "real-time", help_heading = "Segment")]
     pace: Pace,
@@ -142,13 +149,18 @@ fn ended(plant: &Plant, wires: &Wires, by: &str) -> Report {
 }
 
 fn load(arguments: &SimArguments) -> Result<Network, Failure> {
-    let (path, network) = match (&arguments.eni, &arguments.segment) {
-        (Some(path), _) => {
+    let (path, network) = match (&arguments.eni, &arguments.segment, &arguments.network) {
+        (Some(path), ..) => {
             let file = EniFile::load(path).map_err(|error| Failure::new(error.to_string()))?;
             (path.display(), file.simulated(arguments.links.redundant.is_some())?)
         }
-        (None, Some(path)) => (path.display(), Network::from_description(load_segment(path)?)?),
-        (None, None) => return Err(Failure::new("expected --segment FILE.toml or --eni FILE")),
+        (None, Some(path), _) => (path.display(), Network::from_description(load_segment(path)?)?),
+        (None, None, Some(path)) => {
+            let file = LoadedNetwork::load(path).map_err(|error| Failure::new(error.to_string()))?;
+            let simulated = file.simulated(arguments.links.redundant.is_some());
+            (path.display(), simulated.map_err(|error| Failure::new(format!("{}: {error}", path.display())))?)
+        }
+        (None, None, None) => return Err(Failure::new("expected --segment FILE.toml, --eni FILE or --network FILE")),
     };
     if network.host_cable(HostLink::Main).is_none() {
         return Err(Failure::new(format!("{path}: no device is plugged into the main interface")));

@@ -19,6 +19,7 @@ mod options;
 mod order;
 mod process_data;
 mod read_back;
+mod service;
 mod subdevice;
 mod transitions;
 mod whole_bus;

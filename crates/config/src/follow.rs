@@ -10,6 +10,7 @@ mod assignment;
 mod bus;
 mod clocks;
 mod cyclic;
+mod files;
 mod groups;
 mod identity;
 mod image;

@@ -3,10 +3,12 @@
 use std::borrow::Cow;
 
 use ringcat_engine::config::IpSettings;
-use ringcat_wire::mailbox::eoe::{EoeBody, EoeMessage};
+use ringcat_wire::mailbox::eoe::{EoeBody, EoeMessage, IpParameters};
 
 /// EoE type of a Set IP Parameter request.
 pub(crate) const SET_IP: u8 = 2;
+/// Bytes of the longest message: header, flags, all fields.
+const LONGEST: usize = 4 + 4 + 6 + 4 * 4 + NAME;
 /// Bytes of the DNS name in the request.
 pub(crate) const NAME: usize = 32;
 
@@ -22,6 +24,23 @@ pub(crate) fn settings(data: &[u8]) -> Result<IpSettings, &'static str> {
             .with_name(found.name.map(<[u8]>::to_vec))),
         Ok(_) | Err(_) => Err("a message that does not set addresses (EoE type 2) is not sent"),
     }
+}
+
+/// The Set IP Parameter message with these settings, to port 0.
+pub(crate) fn message(of: &IpSettings) -> Vec<u8> {
+    let fields = IpParameters {
+        mac: of.mac,
+        address: of.address,
+        mask: of.mask,
+        gateway: of.gateway,
+        dns: of.dns,
+        name: of.name.as_deref(),
+    };
+    let message = EoeMessage { port: 0, body: EoeBody::SetIp(fields) };
+    let mut bytes = vec![0; LONGEST];
+    let length = message.encode(&mut bytes).unwrap_or_default();
+    bytes.truncate(length);
+    bytes
 }
 
 /// The Set IP Parameter message. Some tools write only the part after the EoE header (protocol 6.5) and leave the

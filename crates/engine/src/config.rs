@@ -45,7 +45,10 @@ pub use pdo::{PdoAssignment, PdoEntry, PdoMapping};
 pub use refused_pdos::RefusedPdos;
 pub use register::{RegisterAccess, RegisterCommand};
 pub use repetition::Repetition;
-pub use startup::{IdnRead, IdnWrite, MailMessage, SdoDownload, SdoUpload, StartupAction, StartupCommand, Transition};
+pub use startup::{
+    FileRead, FileWrite, IdnRead, IdnWrite, MailMessage, SdoDownload, SdoUpload, StartupAction, StartupCommand,
+    Transition,
+};
 pub use timeouts::{StateTimeout, Timeouts};
 
 pub use clocks::{ClockConfig, Passage, PulseGrid, ReferenceClock, SyncSignals, WhenUnlocked};

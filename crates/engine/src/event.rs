@@ -8,6 +8,7 @@ mod messages;
 mod notice;
 #[cfg(feature = "standby")]
 mod standby;
+mod startup_source;
 mod subject;
 mod timed;
 
@@ -20,7 +21,6 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::mailbox::Protocol;
 use ringcat_wire::mailbox::coe::Emergency;
-use ringcat_wire::mailbox::soe::Idn;
 use ringcat_wire::sii::Identity;
 
 pub use clients::{ClientEvents, ClientId};
@@ -30,6 +30,7 @@ pub use messages::{LogFilter, LogLevel, Message, MessageContent, MessagesSince};
 pub(crate) use notice::Notice;
 #[cfg(feature = "standby")]
 pub use standby::{CyclicStandbyEvent, StandbyEvent};
+pub use startup_source::StartupSource;
 pub use subject::{Subject, Subjects};
 pub use timed::TimedEvent;
 
@@ -295,34 +296,17 @@ pub enum Event {
         /// The setting.
         what: String,
     },
-    /// A start-up command read an object.
+    /// A start-up command without a required value read an object, an IDN or a file.
     StartupRead {
         /// Index in the declaration.
         subdevice: SubDeviceId,
         /// Number of the command in the declaration, from 0.
         number: usize,
-        /// Index of the object.
-        index: u16,
-        /// Subindex of the object.
-        sub_index: u8,
+        /// What was read.
+        source: StartupSource,
         /// Purpose of the command, from its declaration.
         comment: Option<String>,
-        /// The value read.
-        data: Vec<u8>,
-    },
-    /// A start-up command read an IDN (protocol 6.6).
-    StartupIdn {
-        /// Index in the declaration.
-        subdevice: SubDeviceId,
-        /// Number of the command in the declaration, from 0.
-        number: usize,
-        /// Drive of the SubDevice.
-        drive: u8,
-        /// The IDN.
-        idn: Idn,
-        /// Purpose of the command, from its declaration.
-        comment: Option<String>,
-        /// The data of its elements.
+        /// The value, the data of the elements, or the contents.
         data: Vec<u8>,
     },
     /// A SubDevice sent a CoE emergency (protocol 6.3). The mailbox of each SubDevice also keeps its last ones.

@@ -1,4 +1,4 @@
-//! The functions of `ecrt.h`, one file per subject.
+//! The functions of `ecrt.h` and `ringcat.h`, one file per subject.
 //!
 //! Pointers of C are checked here and nowhere else. A handle that is NULL, or was ended by deactivation or release, is
 //! found out by its mark. Functions end in a call of the safe modules.
@@ -8,6 +8,7 @@ mod data;
 mod handle;
 mod life;
 mod memory;
+mod network;
 mod objects;
 mod questions;
 mod requests;

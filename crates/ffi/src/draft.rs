@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use ringcat::network::LoadedNetwork;
 use ringcat::{
     ClockConfig, Declaration, DomainId, Entry, EntryPlace, ReferenceClock, RegisterError, Required, SubDeviceConfig,
     SubDeviceId, SubDeviceInfo,
@@ -10,6 +11,7 @@ use ringcat::{
 
 use crate::code::{Code, Outcome, report};
 use crate::domain_words::DomainWords;
+use crate::network::{self, Area, Names};
 use crate::settings::{Name, Settings};
 
 /// A declaration under construction.
@@ -19,6 +21,8 @@ pub struct Draft {
     settings: Vec<Settings>,
     domains: Vec<Arc<DomainWords>>,
     reference: Option<usize>,
+    /// Of a network file.
+    names: Names,
     found: Vec<SubDeviceInfo>,
 }
 
@@ -26,6 +30,11 @@ impl Draft {
     /// Takes over the result of the last scan.
     pub fn set_found(&mut self, found: Vec<SubDeviceInfo>) {
         self.found = found;
+    }
+
+    /// The result of the last scan that it follows.
+    pub fn found(&self) -> Vec<SubDeviceInfo> {
+        self.found.clone()
     }
 
     /// The index of a SubDevice with a name, if it was declared before.
@@ -63,15 +72,66 @@ impl Draft {
     /// The settings of a SubDevice, and what the scan has found at its place.
     ///
     /// # Errors
-    /// No such SubDevice.
+    /// No such SubDevice; its settings are those of a network file.
     pub fn settings(&mut self, index: usize) -> Outcome<(&mut Settings, Option<SubDeviceInfo>)> {
         let info = self.info(index).cloned();
-        Ok((self.settings.get_mut(index).ok_or(Code::INVALID)?, info))
+        let settings = self.settings.get_mut(index).ok_or(Code::INVALID)?;
+        if settings.is_of_file() { Err(Code::BUSY) } else { Ok((settings, info)) }
     }
 
     /// The SubDevice that the scan has found at the place of a declared one; `None` if it is absent or another one.
     pub fn info(&self, index: usize) -> Option<&SubDeviceInfo> {
         self.declaration.found(&self.found, SubDeviceId(index))
+    }
+
+    /// Declares the network of a file. What it leaves to the EEPROM is that of the SubDevices that were found.
+    ///
+    /// # Errors
+    /// SubDevices or domains are declared already; process data of the file does not fit.
+    pub fn load(&mut self, file: &LoadedNetwork) -> Outcome {
+        if !(self.settings.is_empty() && self.domains.is_empty()) {
+            return Err(Code::BUSY);
+        }
+        let loaded = file.declaration();
+        for (index, config) in loaded.subdevices.iter().enumerate() {
+            self.declaration.add_without_domain(config.clone());
+            self.settings.push(Settings::of_file(network::name(index, config), config.clone()));
+        }
+        self.declaration.clocks = loaded.clocks;
+        let mut areas = Vec::new();
+        for domain in &loaded.domains {
+            let (id, _) = self.add_domain();
+            for member in &domain.members {
+                self.place(id, member.subdevice, member.sync_managers.as_deref(), &mut areas)?;
+            }
+            self.registered(id);
+        }
+        let domains: Vec<String> = file.file.domain.iter().map(|domain| domain.name.clone()).collect();
+        self.names = network::names(&file.configuration, &domains, &areas);
+        Ok(())
+    }
+
+    /// Places the process data of a member of a domain.
+    fn place(
+        &mut self,
+        domain: DomainId,
+        subdevice: SubDeviceId,
+        wanted: Option<&[u8]>,
+        areas: &mut Vec<Area>,
+    ) -> Outcome {
+        let found = self.info(subdevice.0).cloned();
+        let config = self.declaration.subdevices.get(subdevice.0).ok_or(Code::INVALID)?;
+        for sync_manager in network::sync_managers(config, found.as_ref(), wanted) {
+            let placed = self.declaration.register_sync_manager(domain, subdevice, sync_manager, found.as_ref());
+            let area = placed.map_err(refusal)?;
+            areas.push(Area { subdevice: subdevice.0, sync_manager, domain, start: area.start });
+        }
+        Ok(())
+    }
+
+    /// Names of the network file; none without one.
+    pub const fn names(&self) -> &Names {
+        &self.names
     }
 
     fn config(&self, index: usize) -> Option<SubDeviceConfig> {
@@ -153,7 +213,12 @@ impl Draft {
                 None => ReferenceClock::FirstWithClock,
                 Some(index) => ReferenceClock::Declared(SubDeviceId(index)),
             };
-            let clocks = ClockConfig::default().as_igh().with_reference(reference);
+            let reference = match (&declaration.clocks, self.reference) {
+                (Some(of_file), None) => of_file.reference,
+                _ => reference,
+            };
+            let of_file = declaration.clocks.take();
+            let clocks = of_file.unwrap_or_else(|| ClockConfig::default().as_igh()).with_reference(reference);
             declaration.clocks = Some(clocks.with_drift_distributions(0));
         }
         declaration

@@ -8,7 +8,7 @@
 //! | links from the environment; the buses of this process | `environment`, `any_links`, `bus` |
 //! | questions, answered here or through a daemon | `responder` |
 //! | mutexes outside of the cyclic path | `locks` |
-//! | settings of a SubDevice, the declaration under construction | `settings`, `draft` |
+//! | settings of a SubDevice, a network file, the declaration under construction | `settings`, `network`, `draft` |
 //! | a handle of a master: reservation, activation, cyclic calls | `master`, `active`, `claim`, `domain_words` |
 //! | requests of the cyclic thread, blocking transfers, information | `request`, `mailbox`, `information` |
 //! | the functions of C | `c` |
@@ -31,6 +31,7 @@ mod information;
 mod locks;
 mod mailbox;
 mod master;
+mod network;
 mod request;
 mod responder;
 mod settings;

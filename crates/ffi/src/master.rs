@@ -8,6 +8,7 @@ use std::sync::{Arc, Mutex, RwLock};
 use std::time::Duration;
 
 use ringcat::daemon::{ClientError, OwnershipWatch};
+use ringcat::network::LoadedNetwork;
 use ringcat::{
     ClockDatagrams, Declaration, DomainId, LastOutputs, Link, Links, LiveStatus, ReferenceClock, Services, SubDeviceId,
 };
@@ -199,6 +200,32 @@ impl Master {
         self.change(|draft| {
             draft.set_found(found);
             Ok(())
+        })
+    }
+
+    /// Declares the network of a file.
+    ///
+    /// # Errors
+    /// As [`Master::change`]; something is declared already, or the file does not fit the bus.
+    pub fn load(&self, file: &LoadedNetwork) -> Outcome {
+        if self.is_active() {
+            return Err(Code::BUSY);
+        }
+        self.refresh()?;
+        let is_ring = self.responder()?.overview()?.is_ring;
+        if file.file.redundancy.ring && !is_ring {
+            report(format_args!("the network file declares a ring: it needs a redundant interface"));
+            return Err(Code::INVALID);
+        }
+        self.change(|draft| {
+            let found = draft.found();
+            let loaded = draft.load(file);
+            // A part of a network is none.
+            if loaded.is_err_and(|code| code != Code::BUSY) {
+                *draft = Draft::default();
+                draft.set_found(found);
+            }
+            loaded
         })
     }
 

@@ -63,6 +63,8 @@ pub struct Settings {
     pub sync: Option<SyncSignals>,
     sii_to_pdi: bool,
     wait_before_safeop: Duration,
+    /// All of them, from a network file.
+    of_file: Option<Box<SubDeviceConfig>>,
 }
 
 impl Settings {
@@ -79,7 +81,18 @@ impl Settings {
             sync: None,
             sii_to_pdi: false,
             wait_before_safeop: Duration::ZERO,
+            of_file: None,
         }
+    }
+
+    /// Those of a network file.
+    pub fn of_file(name: Name, config: SubDeviceConfig) -> Settings {
+        Settings { of_file: Some(Box::new(config)), ..Settings::new(name) }
+    }
+
+    /// Whether they are those of a network file, which the program does not change.
+    pub const fn is_of_file(&self) -> bool {
+        self.of_file.is_some()
     }
 
     fn sync_manager_mut(&mut self, index: u8) -> Outcome<&mut SyncManager> {
@@ -239,6 +252,9 @@ impl Settings {
 
     /// The declaration: SDOs in the order of the calls, then IDNs, then IP parameters.
     pub fn config(&self, info: Option<&SubDeviceInfo>) -> SubDeviceConfig {
+        if let Some(config) = &self.of_file {
+            return (**config).clone();
+        }
         let Name { alias, position, vendor, product } = self.name;
         let address = match alias {
             0 => ConfigAddress::Position(position),

@@ -165,16 +165,16 @@ pub use ringcat_engine::SiiWritten;
 pub use ringcat_engine::StopError;
 pub use ringcat_engine::Urgency;
 pub use ringcat_engine::config::{
-    ClockConfig, ConfigAddress, ConfigError, DeclaredArea, DeclaredSyncManager, Expected, Group, IdentityField,
-    IdnRead, IdnWrite, IpSettings, MailMessage, ModeError, Passage, PdoAssignment, PdoEntry, PdoMapping, PulseGrid,
-    ReferenceClock, RefusedPdos, RegisterAccess, RegisterCommand, SdoDownload, SdoUpload, StartupAction,
+    ClockConfig, ConfigAddress, ConfigError, DeclaredArea, DeclaredSyncManager, Expected, FileRead, FileWrite, Group,
+    IdentityField, IdnRead, IdnWrite, IpSettings, MailMessage, ModeError, Passage, PdoAssignment, PdoEntry, PdoMapping,
+    PulseGrid, ReferenceClock, RefusedPdos, RegisterAccess, RegisterCommand, SdoDownload, SdoUpload, StartupAction,
     StartupCommand, StateTimeout, SubDeviceConfig, SyncManagerRole, SyncSignals, Timeouts, Transition, Watchdog,
     WhenUnlocked,
 };
 pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
 pub use ringcat_engine::event::{
     ClientEvents, ClientId, Event, EventsSince, LogFilter, LogLevel, Message, MessageContent, MessagesSince, Occupant,
-    Subject, Subjects, TimedEvent,
+    StartupSource, Subject, Subjects, TimedEvent,
 };
 pub use ringcat_engine::exchange::{ClockDatagrams, ReferenceTime};
 pub use ringcat_engine::exchange::{CopyError, CopyId, CopyRule, CyclicCounters, Entry, WhenStale};

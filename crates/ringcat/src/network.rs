@@ -30,6 +30,9 @@
 //! # }
 //! ```
 
+#[cfg(feature = "sim")]
+mod simulated;
+
 use std::fmt;
 use std::fs::File;
 use std::io::{self, Read};
@@ -40,6 +43,8 @@ use ringcat_config::{Configuration, Stated};
 use ringcat_engine::main_device::Declaration;
 
 pub use ringcat_config::network::{Digest, NetworkFile, ScanOptions};
+#[cfg(feature = "sim")]
+pub use simulated::SimulatedNetworkError;
 
 /// A network file with the configuration derived from it.
 #[derive(Clone, Debug)]

@@ -16,6 +16,8 @@ pub(super) fn registers(sync: &SyncSignals) -> Vec<(&'static str, RegisterAddres
     let cycles = [sync.sync0_cycle_ns.to_le_bytes(), register_1(sync).to_le_bytes()].concat();
     vec![
         ("set DC cycle time", map::DC_SYNC0_CYCLE, cycles),
+        // The MainDevice that reads the file writes the time.
+        ("set DC start time", map::DC_START_TIME, vec![0; 8]),
         ("set DC activation", map::DC_CYCLIC_UNIT_CONTROL, sync.assign_activate.to_le_bytes().to_vec()),
     ]
 }

@@ -10,6 +10,7 @@ use ringcat_wire::al::AlState;
 use super::error::LeftOut;
 use super::layout::overlaps_in_lrw;
 use super::lrw::Lrw;
+use super::service;
 use crate::configuration::Configuration;
 use crate::xml::one_line;
 
@@ -18,7 +19,7 @@ const FIRST_STATION: u16 = 1001;
 /// State changes with a limit in every file.
 pub(super) const UP: [(AlState, AlState); 3] =
     [(AlState::Init, AlState::PreOp), (AlState::PreOp, AlState::SafeOp), (AlState::SafeOp, AlState::Op)];
-/// State changes with a limit where it is not the usual one.
+/// State changes with a limit in every file, those of BOOT where it is not the usual one.
 pub(super) const OTHERS: [(AlState, AlState); 8] = [
     (AlState::Init, AlState::Boot),
     (AlState::Boot, AlState::Init),
@@ -53,6 +54,10 @@ pub(super) fn explicit(configuration: &Configuration, lrw: &Lrw, left_out: &mut 
     if overlaps_in_lrw(&whole, lrw) {
         move_inputs(&mut whole, left_out);
     }
+    if service::tasks(&whole) > 0 {
+        let bytes = service::image_bytes(&whole);
+        (whole.image.inputs_len, whole.image.outputs_len) = (bytes, bytes);
+    }
     whole
 }
 
@@ -69,7 +74,7 @@ fn move_inputs(whole: &mut Configuration, left_out: &mut Vec<LeftOut>) {
     left_out.push(LeftOut::new(None, "place of the inputs", reason));
 }
 
-/// Time limits that an ENI states at the check of AL status.
+/// Time limits that an ENI states at the check of AL status, so that each change is waited for.
 fn limits(config: &mut SubDeviceConfig) {
     if config.declared.is_none() {
         return;
@@ -78,7 +83,8 @@ fn limits(config: &mut SubDeviceConfig) {
     for (from, to) in UP.into_iter().chain(OTHERS) {
         let limit = config.limit(from, to);
         let is_stated = config.state_timeouts.iter().any(|it| (it.from, it.to) == (from, to));
-        if !is_stated && (UP.contains(&(from, to)) || limit != usual.limit(from, to)) {
+        let is_of_boot = from == AlState::Boot || to == AlState::Boot;
+        if !is_stated && (!is_of_boot || limit != usual.limit(from, to)) {
             config.state_timeouts.push(StateTimeout::new(from, to, limit));
         }
     }

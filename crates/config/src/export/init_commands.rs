@@ -19,6 +19,10 @@ use crate::eni::{Datagram, EcatCommand, Place, Requires, Target, Transition, Val
 const RETRIES: u16 = 3;
 /// Time for a read of the EEPROM, in milliseconds.
 const EEPROM_MS: u32 = 100;
+/// Time to INIT before the bring-up, in milliseconds.
+const INIT_MS: u32 = 3000;
+/// AL control: an error is acknowledged.
+const ACKNOWLEDGE: u8 = 0x10;
 /// Time for an identification, in milliseconds.
 const IDENTIFY_MS: u32 = 100;
 /// AL control: the identification is requested.
@@ -56,8 +60,9 @@ pub(super) fn complete(
         out.raw(config, transition);
     }
     out.raw(config, EngineTransition::Ii);
-    out.begin(config);
     let (mailboxes, data): (Vec<_>, Vec<_>) = declared.iter().partition(|it| it.role.direction().is_none());
+    out.begin_in_init(config, !mailboxes.is_empty());
+    out.begin(config);
     mailboxes.iter().for_each(|it| out.clear_sync_manager(&[Ip, Ib, Pi, Si, Oi], it.index));
     mailboxes.into_iter().for_each(|it| out.sync_manager(Ip, it.index, &it.register));
     if let Some(both) = &config.declared_bootstrap {
@@ -65,22 +70,15 @@ pub(super) fn complete(
     }
     out.raw(config, EngineTransition::Ib);
     out.state(config, &[Ib], AlState::Boot);
+    if config.sync.is_some() {
+        out.write(&[Ip], "clear DC activation", map::DC_CYCLIC_UNIT_CONTROL, vec![0; 2]);
+    }
     out.raw(config, EngineTransition::Ip);
     if config.sii_to_pdi {
         out.write(&[Ip], "assign EEPROM to PDI", map::SII_CONFIGURATION, vec![1]);
     }
     out.state(config, &[Ip], AlState::PreOp);
-    for it in &data {
-        let mut early = it.register;
-        early.activate.enable &= !it.op_only;
-        out.sync_manager(Ps, it.index, &early);
-    }
-    for (number, fmmu) in (0_u8..).zip(fmmus) {
-        out.write(&[Ps], &format!("set fmmu {number}"), map::fmmu(number), fmmu.encode().to_vec());
-    }
-    for (comment, ado, data) in config.sync.iter().flat_map(clocks::registers) {
-        out.write(&[Ps], comment, ado, data);
-    }
+    out.process_data(config, &data, fmmus);
     out.raw(config, EngineTransition::Pp);
     out.raw(config, EngineTransition::Ps);
     out.state(config, &[Ps], AlState::SafeOp);
@@ -174,6 +172,37 @@ impl Commands {
         let data = vec![0; validate.data.len()];
         let command = self.command(transitions, comment, Command::Fprd, ado, data, Some(validate));
         self.list.push(command);
+    }
+
+    /// Whatever its state is, a SubDevice begins in INIT; one with a mailbox may have an error to acknowledge.
+    fn begin_in_init(&mut self, config: &SubDeviceConfig, has_mailbox: bool) {
+        use Transition::{Ib, Ip};
+        let first: &[Transition] = if config.declared_bootstrap.is_some() { &[Ip, Ib] } else { &[Ip] };
+        let state = AlState::Init.code();
+        let code = vec![if has_mailbox { state | ACKNOWLEDGE } else { state }, 0];
+        let comment = format!("set device state to {}", AlState::Init);
+        let mut request = self.command(first, &comment, Command::Apwr, map::AL_CONTROL, code, None);
+        request.requires = Some(Requires::Cycle);
+        let validate = Validate { data: vec![state, 0], mask: Some(STATE_MASK.to_vec()), timeout_ms: INIT_MS };
+        let comment = format!("check device state for {}", AlState::Init);
+        let check = self.command(first, &comment, Command::Aprd, map::AL_STATUS, vec![0; 2], Some(validate));
+        self.list.extend([request, check]);
+    }
+
+    /// SyncManagers and FMMUs of process data, SYNC signals.
+    fn process_data(&mut self, config: &SubDeviceConfig, data: &[&DeclaredSyncManager], fmmus: &[Fmmu]) {
+        use Transition::Ps;
+        for it in data {
+            let mut early = it.register;
+            early.activate.enable &= !it.op_only;
+            self.sync_manager(Ps, it.index, &early);
+        }
+        for (number, fmmu) in (0_u8..).zip(fmmus) {
+            self.write(&[Ps], &format!("set fmmu {number}"), map::fmmu(number), fmmu.encode().to_vec());
+        }
+        for (comment, ado, data) in config.sync.iter().flat_map(clocks::registers) {
+            self.write(&[Ps], comment, ado, data);
+        }
     }
 
     /// Address, identity, watchdogs.

@@ -32,6 +32,7 @@ pub(super) fn mailbox(
             Some(Section::SoE) => "SoE",
             Some(Section::EoE) => "EoE",
             Some(Section::AoE) => "AoE",
+            Some(Section::FoE) => "FoE",
             Some(Section::VoE) => "VoE",
             Some(Section::Registers) | None => continue,
         };

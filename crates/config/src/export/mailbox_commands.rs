@@ -1,8 +1,10 @@
-//! Start-up commands through the mailbox: CoE, SoE, EoE, AoE, VoE.
+//! Start-up commands through the mailbox: CoE, SoE, EoE, AoE, FoE, VoE.
 
 use ringcat_engine::config::{
-    IdnRead, IdnWrite, IpSettings, MailMessage, SdoDownload, SdoUpload, StartupAction, StartupCommand,
+    FileRead, FileWrite, IdnRead, IdnWrite, IpSettings, MailMessage, SdoDownload, SdoUpload, StartupAction,
+    StartupCommand,
 };
+use ringcat_wire::mailbox::foe::FoeMessage;
 
 use super::init_commands::ms;
 use super::order::{Order, Section, place};
@@ -13,6 +15,8 @@ use crate::ip;
 /// `Ccs`.
 const DOWNLOAD: u8 = 1;
 const UPLOAD: u8 = 2;
+/// Bytes of a mailbox of which the declaration does not state the size.
+const SMALL_MAILBOX: usize = 128;
 /// `OpCode` of a read; `OpCode` and `Elements` of a write of the value.
 const SOE_READ: u8 = 2;
 const SOE_WRITE: u8 = 3;
@@ -31,6 +35,16 @@ pub(super) fn add(startup: &[StartupCommand], order: &Order, mailbox: &mut Mailb
             }
             StartupAction::Mail(MailMessage::Voe(data)) => {
                 mailbox.others.push(message(command, "VoE", data, place(order, Section::VoE)));
+            }
+            StartupAction::FileRead(FileRead { name, password, .. }) => {
+                let request = FoeMessage::Read { password: *password, name: name.as_bytes() };
+                mailbox.others.push(message(command, "FoE", &foe(&request), place(order, Section::FoE)));
+            }
+            StartupAction::FileWrite(of) => {
+                let size = mailbox.send.map_or(SMALL_MAILBOX, |send| send.length.into());
+                let place = place(order, Section::FoE);
+                let messages = file(of, FoeMessage::max_data(size)).into_iter();
+                mailbox.others.extend(messages.map(|data| message(command, "FoE", &data, place)));
             }
             StartupAction::Ip(of) => mailbox.eoe.push(settings(command, of, order)),
             _ => {}
@@ -110,21 +124,44 @@ fn message(command: &StartupCommand, protocol: &'static str, data: &[u8], place:
     }
 }
 
+/// A request and the packets of a file; one that is not full ends it.
+fn file(of: &FileWrite, full: usize) -> Vec<Vec<u8>> {
+    let full = full.max(1);
+    let request = FoeMessage::Write { password: of.password, name: of.name.as_bytes() };
+    let end: Option<&[u8]> = of.data.len().is_multiple_of(full).then_some(&[]);
+    let packets = of.data.chunks(full).chain(end);
+    let packets = (1..).zip(packets).map(|(packet, data)| foe(&FoeMessage::Data { packet, data }));
+    core::iter::once(foe(&request)).chain(packets).collect()
+}
+
+/// The bytes of a message.
+fn foe(message: &FoeMessage<'_>) -> Vec<u8> {
+    let data = match message {
+        FoeMessage::Read { name, .. } | FoeMessage::Write { name, .. } => name.len(),
+        FoeMessage::Data { data, .. } => data.len(),
+        _ => 0,
+    };
+    let mut bytes = vec![0; FoeMessage::OVERHEAD + data];
+    let length = message.encode(&mut bytes).unwrap_or_default();
+    bytes.truncate(length);
+    bytes
+}
+
+/// The message as it is sent, which every edition of the format has.
 fn settings(command: &StartupCommand, of: &IpSettings, order: &Order) -> EoeCommand {
-    let address = |address: Option<std::net::Ipv4Addr>| address.map(|address| address.octets().to_vec());
     EoeCommand {
         place: place(order, Section::EoE),
         transitions: vec![transition(command.transition)],
         comment: command.comment.clone().unwrap_or_default(),
         timeout_ms: limit(command),
-        kind: Some(ip::SET_IP),
-        mac: of.mac.map(|mac| mac.to_vec()),
-        ip: address(of.address),
-        subnet: address(of.mask),
-        gateway: address(of.gateway),
-        server: address(of.dns),
-        name: of.name.as_ref().map(|name| String::from_utf8_lossy(name).into_owned()),
-        data: Vec::new(),
+        kind: None,
+        mac: None,
+        ip: None,
+        subnet: None,
+        gateway: None,
+        server: None,
+        name: None,
+        data: ip::message(of),
         disabled: false,
     }
 }

@@ -12,15 +12,16 @@ pub(super) enum Section {
     SoE,
     EoE,
     AoE,
+    FoE,
     VoE,
     Registers,
 }
 
 /// Sections in their order.
-pub(super) type Order = [Section; 6];
+pub(super) type Order = [Section; 7];
 
 /// Those of mailbox protocols, which are together, in the order of the schema.
-const PROTOCOLS: [Section; 5] = [Section::CoE, Section::SoE, Section::EoE, Section::AoE, Section::VoE];
+const PROTOCOLS: [Section; 6] = [Section::CoE, Section::SoE, Section::AoE, Section::EoE, Section::FoE, Section::VoE];
 
 pub(super) const fn section(action: &StartupAction) -> Option<Section> {
     match action {
@@ -30,6 +31,7 @@ pub(super) const fn section(action: &StartupAction) -> Option<Section> {
         StartupAction::Ip(_) => Some(Section::EoE),
         StartupAction::Mail(MailMessage::Aoe(_)) => Some(Section::AoE),
         StartupAction::Mail(MailMessage::Voe(_)) => Some(Section::VoE),
+        StartupAction::FileWrite(_) | StartupAction::FileRead(_) => Some(Section::FoE),
         _ => None,
     }
 }
@@ -51,9 +53,9 @@ pub(super) fn order(commands: &[StartupCommand]) -> Option<Order> {
         return None;
     }
     let (mut protocols, mut found) = (PROTOCOLS, None);
-    permutations(&mut protocols, 0, &mut |[a, b, c, d, e]| {
+    permutations(&mut protocols, 0, &mut |[a, b, c, d, e, f]| {
         let registers = Section::Registers;
-        let orders = [[*a, *b, *c, *d, *e, registers], [registers, *a, *b, *c, *d, *e]];
+        let orders = [[*a, *b, *c, *d, *e, *f, registers], [registers, *a, *b, *c, *d, *e, *f]];
         found = found.or_else(|| orders.into_iter().find(is_kept));
         found.is_some()
     });
@@ -61,7 +63,7 @@ pub(super) fn order(commands: &[StartupCommand]) -> Option<Order> {
 }
 
 /// Calls `done` with the permutations of a list from a place on, first the list itself, until it returns true.
-fn permutations(list: &mut [Section; 5], from: usize, done: &mut impl FnMut(&[Section; 5]) -> bool) -> bool {
+fn permutations(list: &mut [Section; 6], from: usize, done: &mut impl FnMut(&[Section; 6]) -> bool) -> bool {
     if from + 1 >= list.len() {
         return done(list);
     }

@@ -1,4 +1,4 @@
-//! Commands through mailboxes: those of CoE, SoE, EoE, AoE and VoE become start-up commands (protocol 6, 8.1).
+//! Commands through mailboxes: those of CoE, SoE, EoE, AoE, FoE and VoE become start-up commands (protocol 6, 8.1).
 
 use std::net::Ipv4Addr;
 use std::time::Duration;
@@ -9,6 +9,7 @@ use ringcat_engine::config::{
 use ringcat_wire::mailbox::soe::{Idn, SoeElements};
 
 use super::bus::Bus;
+use super::files;
 use super::messages::{contradiction, named};
 use super::notices::Notices;
 use super::transitions::{Planned, comment};
@@ -71,15 +72,23 @@ pub(super) fn startup(
             Err(reason) => notices.add(Some(*place), Some(index), subject, reason),
         }
     }
-    for command in mailbox.others.iter().filter(|command| !command.disabled) {
-        let subject = named(&format!("{}/InitCmd", command.protocol), &command.comment);
+    for (command, action) in others(&mailbox.others) {
         let RawMailCommand { place, transitions, timeout_ms, comment, .. } = command;
-        match message(command).map(StartupAction::Mail) {
+        let subject = named(&format!("{}/InitCmd", command.protocol), comment);
+        match action {
             Ok(action) => add(*place, transitions, &subject, *timeout_ms, comment, action, notices),
             Err(reason) => notices.add(Some(*place), Some(index), subject, reason),
         }
     }
     Ok(())
+}
+
+/// Transfers of files, and the messages of AoE and VoE.
+fn others(commands: &[RawMailCommand]) -> Vec<(&RawMailCommand, Result<StartupAction, String>)> {
+    let transfers = files::transfers(commands).into_iter().map(|transfer| (transfer.command, transfer.action));
+    let messages = commands.iter().filter(|command| !command.disabled && command.protocol != files::PROTOCOL);
+    let message = |command| message(command).map(StartupAction::Mail).map_err(str::to_owned);
+    transfers.chain(messages.map(|command| (command, message(command)))).collect()
 }
 
 /// A limit of 0 is the default.
@@ -119,13 +128,12 @@ fn idn(command: &SoeCommand) -> Result<StartupAction, String> {
     }
 }
 
-/// A message of AoE or VoE. A transfer of FoE consists of several messages that depend on the answers.
+/// A message of AoE or VoE.
 fn message(command: &RawMailCommand) -> Result<MailMessage, &'static str> {
     let data = command.data.clone();
     let (message, reason) = match command.protocol {
         "AoE" => (MailMessage::Aoe(data), "its Data is no AMS header with a request: not sent"),
-        "VoE" => (MailMessage::Voe(data), "its Data is no VoE header with data: not sent"),
-        _ => return Err("a file is not transferred by one message: not sent"),
+        _ => (MailMessage::Voe(data), "its Data is no VoE header with data: not sent"),
     };
     if message.is_sound() { Ok(message) } else { Err(reason) }
 }

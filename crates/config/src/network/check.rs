@@ -312,18 +312,21 @@ fn command(startup: &Startup) -> Checked {
         startup.ip.is_some(),
         startup.aoe.is_some(),
         startup.voe.is_some(),
+        startup.write_file.is_some(),
+        startup.read_file.is_some(),
         startup.write.is_some(),
         startup.check.is_some(),
     ];
     let count = given.iter().filter(|is_given| **is_given).count();
     if count != 1 {
-        let keys = "sdo, upload, idn, read_idn, ip, aoe, voe, write and check";
+        let keys = "sdo, upload, idn, read_idn, ip, aoe, voe, write_file, read_file, write and check";
         return fault([], format!("expected one of {keys}, got {count} of them"));
     }
     if startup.at == At::Ii && startup.write.is_none() && startup.check.is_none() {
         return fault(["at".into()], "II is in INIT, which has no mailbox: expected write or check".to_owned());
     }
     messages(startup)?;
+    files(startup)?;
     complete(startup)?;
     if let Some(idn) = startup.idn.as_ref().filter(|idn| idn.drive > 7) {
         return fault(["idn".into(), "drive".into()], format!("expected 0 to 7, got {}", idn.drive));
@@ -368,6 +371,20 @@ fn messages(startup: &Startup) -> Checked {
     for (key, message, expected) in messages {
         if message.is_some_and(|message| !message.is_sound()) {
             return fault([key.into()], format!("expected {expected}"));
+        }
+    }
+    Ok(())
+}
+
+/// Files have a name.
+fn files(startup: &Startup) -> Checked {
+    let names = [
+        ("write_file", startup.write_file.as_ref().map(|file| &file.name)),
+        ("read_file", startup.read_file.as_ref().map(|file| &file.name)),
+    ];
+    for (key, name) in names {
+        if name.is_some_and(|name| name.is_empty() || name.contains('\0')) {
+            return fault([key.into(), "name".into()], "expected the name of a file");
         }
     }
     Ok(())

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use ringcat_engine::config::{
-    IdnRead, IdnWrite, IpSettings, MailMessage, RegisterAccess, RegisterCommand, SdoDownload, SdoUpload, StartupAction,
-    StartupCommand, Transition,
+    FileRead, FileWrite, IdnRead, IdnWrite, IpSettings, MailMessage, RegisterAccess, RegisterCommand, SdoDownload,
+    SdoUpload, StartupAction, StartupCommand, Transition,
 };
 use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::mailbox::soe::{Idn, SoeElements};
@@ -65,6 +65,13 @@ fn mail(of: &model::Startup) -> Option<StartupAction> {
         let expected = read.data.as_ref().map(|data| data.0.clone());
         let command = IdnRead::new(read.drive, Idn(read.idn)).with_elements(elements).with_expected(expected);
         return Some(StartupAction::IdnRead(command));
+    }
+    if let Some(file) = &of.write_file {
+        let write = FileWrite::new(&file.name, file.data.0.clone()).with_password(file.password);
+        return Some(StartupAction::FileWrite(write));
+    }
+    if let Some(file) = &of.read_file {
+        return Some(StartupAction::FileRead(FileRead::new(&file.name).with_password(file.password)));
     }
     let aoe = of.aoe.as_ref().map(|data| MailMessage::Aoe(data.0.clone()));
     let message = aoe.or_else(|| of.voe.as_ref().map(|data| MailMessage::Voe(data.0.clone())));

@@ -6,7 +6,7 @@ mod startup;
 
 use serde::Deserialize;
 
-pub use startup::{At, Check, Idn, Ip, ReadIdn, Sdo, Startup, Upload, Write};
+pub use startup::{At, Check, Idn, Ip, ReadFile, ReadIdn, Sdo, Startup, Upload, Write, WriteFile};
 
 use super::values::{Shift, Time};
 

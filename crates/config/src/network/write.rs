@@ -405,6 +405,20 @@ const fn transition(at: At) -> &'static str {
     }
 }
 
+/// Transfers of files, as inline tables.
+fn files(of: &Startup) -> Vec<(&'static str, Vec<Option<String>>)> {
+    let head = |name: &str, password: u32| {
+        let password = (password != 0).then(|| format!("password = {password}"));
+        vec![Some(format!("name = {}", Quoted(name))), password]
+    };
+    let write = of.write_file.as_ref().map(|file| {
+        let data = vec![Some(format!("data = \"{}\"", file.data))];
+        ("write_file", [head(&file.name, file.password), data].concat())
+    });
+    let read = of.read_file.as_ref().map(|file| ("read_file", head(&file.name, file.password)));
+    write.into_iter().chain(read).collect()
+}
+
 fn startup(out: &mut Text, of: &Startup) {
     out.table("[[subdevice.startup]]");
     out.word("at", of.at, At::default(), transition);
@@ -444,6 +458,7 @@ fn startup(out: &mut Text, of: &Startup) {
         let (own, mask) = (address("address", ip.address), address("mask", ip.mask));
         inline("ip", vec![mac, own, mask, address("gateway", ip.gateway), address("dns", ip.dns), name]);
     }
+    files(of).into_iter().for_each(|(key, pairs)| inline(key, pairs));
     if let Some(write) = &of.write {
         let address = pair("address", hex_4(write.address).to_string());
         let data = pair("data", bytes(&write.data));

@@ -1,8 +1,10 @@
 //! ENIs that are written (protocol 8): from other ENIs, from network files, with whatever texts they hold.
 
+mod commands;
 mod networks;
 mod refusals;
 mod round_trips;
+mod schema;
 
 use ringcat_config::eni::{self, Eni};
 use ringcat_config::network::NetworkFile;

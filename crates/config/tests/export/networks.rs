@@ -1,6 +1,6 @@
 //! ENIs from network files.
 
-use ringcat_config::{ExportOptions, LrwUse};
+use ringcat_config::{Export, ExportOptions, LrwUse};
 use ringcat_engine::config::{ConfigAddress, ReferenceClock, StartupAction, SyncManagerRole, Transition};
 use ringcat_engine::declared::{GroupId, SubDeviceId};
 use ringcat_engine::info::Direction;
@@ -157,10 +157,16 @@ fn inputs_that_would_replace_outputs_in_an_lrw_are_behind_the_outputs() {
         file.to_eni(&ExportOptions::default().with_lrw(LrwUse::Always)).unwrap_or_else(|error| panic!("{error}"));
     let image = &export.configuration.image;
     let inputs = image.areas.iter().filter(|area| area.direction == Direction::Inputs);
-    assert_eq!(inputs.map(|area| area.image_bit).min(), Some(image.outputs_len as u32 * 8));
+    let outputs = image.areas.iter().filter(|area| area.direction == Direction::Outputs);
+    let outputs = outputs.map(|area| (area.image_bit + area.bits).div_ceil(8)).max().expect("there are outputs");
+    assert_eq!(inputs.map(|area| area.image_bit).min(), Some(outputs * 8));
     assert!(export.left_out.iter().any(|it| it.what == "place of the inputs"), "{:?}", export.left_out);
     let apart = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!(apart.configuration.image.inputs_len + image.outputs_len, image.inputs_len);
+    let first = |of: &Export| {
+        let inputs = of.configuration.image.areas.iter().filter(|area| area.direction == Direction::Inputs);
+        inputs.map(|area| area.image_bit).min().expect("there are inputs")
+    };
+    assert_eq!(first(&apart) + outputs * 8, first(&export));
 }
 
 // covers: eni-run

@@ -64,7 +64,7 @@ fn a_network_without_subdevices_is_refused() {
     assert_eq!(error.expect_err("nothing is there").to_string(), "network: it has no SubDevice");
 }
 
-// covers: eni-run
+// covers: ES-139, eni-run
 #[test]
 fn settings_that_an_eni_has_no_place_for_are_listed() {
     let mut file = network(CELL);

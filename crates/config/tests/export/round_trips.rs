@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use ringcat_config::{Configuration, ExportOptions, LrwUse, eni, follow};
-use ringcat_engine::config::SubDeviceConfig;
+use ringcat_engine::config::{FileRead, FileWrite, StartupAction, SubDeviceConfig};
 use ringcat_wire::al::AlState;
 
 use crate::{SMALL, again, configured, model};
@@ -51,6 +51,19 @@ fn settings(config: &SubDeviceConfig) -> String {
     format!("{config:#?} {limits:?}")
 }
 
+/// The same with the length of the exported images: both have the longer one, and room for time and states.
+fn with_room(expected: &Configuration, got: &Configuration) -> Configuration {
+    /// A time that sets the reference clock, one that is distributed, the states.
+    const SERVICE: usize = 4 + 4 + 2;
+    let mut expected = expected.clone();
+    let (bytes, longest) = (got.image.inputs_len, expected.image.inputs_len.max(expected.image.outputs_len));
+    if !got.declaration.domains.is_empty() || expected.cycle.is_some() || expected.declaration.clocks.is_some() {
+        assert!((longest..=longest + SERVICE).contains(&bytes), "{bytes} for {longest}");
+        (expected.image.inputs_len, expected.image.outputs_len) = (bytes, bytes);
+    }
+    expected
+}
+
 fn assert_same(name: &str, expected: &Configuration, got: &Configuration) {
     for (expected, got) in expected.declaration.subdevices.iter().zip(&got.declaration.subdevices) {
         assert_eq!(settings(expected), settings(got), "{name}");
@@ -82,12 +95,12 @@ fn the_model_of_every_file_is_the_same_when_it_is_written_and_read() {
     }
 }
 
-// covers: eni-run
+// covers: ES-142, eni-run
 #[test]
 fn every_eni_gives_the_same_declaration_when_it_is_exported_and_read() {
     for (name, text) in files() {
         let export = again(&text, &ExportOptions::default()).unwrap_or_else(|error| panic!("{name}: {error}"));
-        assert_same(&name, &configured(&text), &export.configuration);
+        assert_same(&name, &with_room(&configured(&text), &export.configuration), &export.configuration);
         assert_same(&name, &export.configuration, &configured(&export.text));
         let second = again(&export.text, &ExportOptions::default()).unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!(second.text, export.text, "{name}: the second export is the first one");
@@ -102,7 +115,7 @@ fn an_eni_is_exported_with_lrw_and_without_it() {
         let before = configured(&text);
         let without = again(&text, &ExportOptions::default().with_lrw(LrwUse::Never)).unwrap();
         assert_eq!(without.configuration.declaration.explicit_lrw, [], "{name}");
-        assert_eq!(without.configuration.image, before.image, "{name}");
+        assert_eq!(without.configuration.image, with_room(&before, &without.configuration).image, "{name}");
         let with = again(&text, &ExportOptions::default().with_lrw(LrwUse::Always)).unwrap();
         let has_data = before.image.areas.iter().any(|area| area.sync_manager.is_some());
         assert_eq!(with.configuration.declaration.explicit_lrw.is_empty(), !has_data, "{name}");
@@ -135,7 +148,7 @@ fn a_changed_number_gives_the_same_declaration_again_or_a_refusal() {
         let Ok(configuration) = eni::read(text.as_bytes()).and_then(|eni| follow(&eni)) else { continue };
         match again(&text, &ExportOptions::default()) {
             Ok(export) => {
-                assert_same(&text, &configuration, &export.configuration);
+                assert_same(&text, &with_room(&configuration, &export.configuration), &export.configuration);
                 same += 1;
             }
             Err(error) => {
@@ -171,8 +184,40 @@ fn commands_at_all_transitions_and_messages_keep_their_place_when_exported() {
     let text = text.replacen(at, &format!("{register}{at}"), 1);
     let expected = configured(&text);
     let export = again(&text, &ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
-    assert_same("all", &expected, &export.configuration);
+    assert_same("all", &with_room(&expected, &export.configuration), &export.configuration);
     let count = export.configuration.declaration.subdevices[3].startup.len();
     assert_eq!(count, expected.declaration.subdevices[3].startup.len());
     assert!(count > 13 + 3 * 12, "{count}");
+}
+
+/// Files of no, some and several full packets.
+// covers: 6.4, 8.2, eni-run
+#[test]
+fn transfers_of_files_keep_their_contents_when_exported() {
+    let command = |data: &[u8]| {
+        let data: String = data.iter().map(|byte| format!("{byte:02x}")).collect();
+        format!("<InitCmd><Transition>PS</Transition><Timeout>5</Timeout><Data>{data}</Data></InitCmd>")
+    };
+    let packet = |number: u32, data: &[u8]| command(&[&[3, 0][..], &number.to_le_bytes(), data].concat());
+    let file = |contents: &[u8]| {
+        let packets = (1..).zip(contents.chunks(50)).map(|(number, data)| packet(number, data));
+        let packets: String = if contents.is_empty() { packet(1, &[]) } else { packets.collect() };
+        command(b"\x02\0\x04\x03\x02\x01gains") + &packets
+    };
+    for length in [0, 1, 40, 115, 116, 117, 232, 1000] {
+        let contents: Vec<u8> = (0..length).map(|byte| byte as u8).collect();
+        let commands = file(&contents) + &command(b"\x01\0\0\0\0\0log");
+        let files = format!("<FoE><InitCmds>{commands}</InitCmds></FoE>");
+        let text = SMALL.replacen("<AoE><NetId>5.6.7.8.3.1</NetId></AoE>", &files, 1);
+        let expected = configured(&text);
+        let export = again(&text, &ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        assert_same(&length.to_string(), &with_room(&expected, &export.configuration), &export.configuration);
+        let startup = &export.configuration.declaration.subdevices[3].startup;
+        let kept = startup.iter().find_map(|command| match &command.action {
+            StartupAction::FileWrite(write) => Some(write),
+            _ => None,
+        });
+        assert_eq!(kept, Some(&FileWrite::new("gains", contents).with_password(0x0102_0304)));
+        assert!(startup.iter().any(|command| command.action == StartupAction::FileRead(FileRead::new("log"))));
+    }
 }

@@ -1,7 +1,8 @@
 //! Commands beside those of every file: at all transitions, for the whole bus, of AoE, FoE and VoE, reads of IDNs.
 
 use ringcat_engine::config::{
-    IdnRead, MailMessage, RegisterAccess, StartupAction, StartupCommand, SubDeviceConfig, Transition,
+    FileRead, FileWrite, IdnRead, MailMessage, RegisterAccess, StartupAction, StartupCommand, SubDeviceConfig,
+    Transition,
 };
 use ringcat_wire::mailbox::soe::{Idn, SoeElements};
 
@@ -101,7 +102,7 @@ fn idns_are_read_and_compared_if_the_command_has_data() {
 
 // covers: 6.7, 6.8, 8.2, eni-image
 #[test]
-fn messages_of_aoe_and_voe_are_sent_and_files_and_other_bytes_are_noted() {
+fn messages_of_aoe_and_voe_are_sent_and_other_bytes_are_noted() {
     let command = |protocol: &str, data: &str| {
         let command = format!(
             "<InitCmd><Transition>PS</Transition><Comment>{protocol}</Comment><Timeout>70</Timeout>\
@@ -109,7 +110,7 @@ fn messages_of_aoe_and_voe_are_sent_and_files_and_other_bytes_are_noted() {
         );
         format!("<{protocol}><InitCmds>{command}</InitCmds></{protocol}>")
     };
-    let all = [command("AoE", AMS), command("VoE", "470c00000700aa"), command("FoE", "020000000000")].concat();
+    let all = [command("AoE", AMS), command("VoE", "470c00000700aa")].concat();
     let configuration = changed(&[(MAILBOX, &all)]);
     let config = drive(&configuration);
     let action = |comment: &str| commented(&config, comment).first().map(|command| command.action.clone());
@@ -118,8 +119,6 @@ fn messages_of_aoe_and_voe_are_sent_and_files_and_other_bytes_are_noted() {
     let voe = MailMessage::Voe(vec![0x47, 0x0C, 0, 0, 7, 0, 0xAA]);
     assert_eq!(action("VoE"), Some(StartupAction::Mail(voe)));
     assert_eq!(commented(&config, "AoE")[0].limit, Some(std::time::Duration::from_millis(70)));
-    assert_eq!(action("FoE"), None);
-    assert!(has_notice(&configuration, &["FoE/InitCmd \"FoE\"", "not transferred by one message: not sent", "line "]));
     // The answer to a request is none.
     let wrong = [command("AoE", &AMS.replace("04000400", "04000500")), command("VoE", "470c")].concat();
     let wrong = changed(&[(MAILBOX, &wrong)]);
@@ -127,6 +126,65 @@ fn messages_of_aoe_and_voe_are_sent_and_files_and_other_bytes_are_noted() {
         [("AoE/InitCmd \"AoE\"", "no AMS header with a request"), ("VoE/InitCmd \"VoE\"", "no VoE header")]
     {
         assert!(has_notice(&wrong, &[subject, reason]));
+    }
+}
+
+/// A command of FoE with a message.
+fn file(at: &str, comment: &str, data: &str) -> String {
+    format!(
+        "<InitCmd><Transition>{at}</Transition><Comment>{comment}</Comment><Timeout>70</Timeout><Data>{data}</Data>\
+         </InitCmd>"
+    )
+}
+
+/// A request to write "a.txt" with the password 7, and two packets of it; a request to read it.
+const WRITE: &str = "020007000000612e747874";
+const PACKET_1: &str = "0300010000003132";
+const PACKET_2: &str = "030002000000";
+const READ: &str = "010000000000612e74787400";
+
+fn files(commands: &[String]) -> ringcat_config::Configuration {
+    changed(&[(MAILBOX, &format!("<FoE><InitCmds>{}</InitCmds></FoE>", commands.concat()))])
+}
+
+// covers: 6.4, 8.2, eni-image
+#[test]
+fn the_messages_of_a_file_are_one_transfer() {
+    let both = files(&[
+        file("PS", "gains", WRITE),
+        file("PS", "", PACKET_1),
+        file("PS", "", PACKET_2),
+        file("PS", "log", READ),
+        file("PS", "", "040001000000"),
+        file("IP", "early", READ),
+    ]);
+    assert!(!has_notice(&both, &["FoE/InitCmd"]), "{:#?}", notices(&both));
+    let config = drive(&both);
+    let [gains, log, early] = ["gains", "log", "early"].map(|comment| commented(&config, comment)[0]);
+    let write = FileWrite::new("a.txt", b"12").with_password(7);
+    assert_eq!((gains.transition, &gains.action), (Transition::Ps, &StartupAction::FileWrite(write)));
+    assert_eq!(gains.limit, Some(std::time::Duration::from_millis(70)));
+    assert_eq!(log.action, StartupAction::FileRead(FileRead::new("a.txt")));
+    assert_eq!((early.transition, &early.action), (Transition::Ip, &log.action));
+}
+
+// covers: 6.4, 8.2, eni-image
+#[test]
+fn messages_that_are_no_whole_file_are_noted() {
+    let cases: [(&[(&str, &str)], &str); 7] = [
+        (&[("PS", WRITE)], "no packet with the contents of the file follows: not sent"),
+        (&[("PS", WRITE), ("IP", PACKET_1)], "no packet with the contents of the file follows: not sent"),
+        (&[("PS", WRITE), ("PS", PACKET_2)], "packet 2 follows where packet 1 is expected: not sent"),
+        (&[("PS", WRITE), ("PS", "0600")], "packet 1 is no packet of a file: not sent"),
+        (&[("PS", PACKET_1)], "its Data is no request of a file, and none is before it: not sent"),
+        (&[("PS", READ), ("PS", PACKET_1)], "only acknowledgements follow the request of a file: not sent"),
+        (&[("PS", "010000000000ff")], "the name of the file is no text: not sent"),
+    ];
+    for (commands, reason) in cases {
+        let commands: Vec<String> = commands.iter().map(|(at, data)| file(at, "file", data)).collect();
+        let noted = files(&commands);
+        assert!(has_notice(&noted, &["FoE/InitCmd \"file\"", reason, "line "]), "{reason}: {:#?}", notices(&noted));
+        assert!(commented(&drive(&noted), "file").is_empty(), "{reason}");
     }
 }
 

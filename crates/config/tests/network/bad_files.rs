@@ -89,7 +89,8 @@ const CHANGES: &[(&str, &str, &str)] = &[
     (
         "at = \"SO\"\n",
         "at = \"SO\"\nsdo = { index = 1, data = \"\" }\n",
-        "expected one of sdo, upload, idn, read_idn, ip, aoe, voe, write and check, got 2 of them",
+        "expected one of sdo, upload, idn, read_idn, ip, aoe, voe, write_file, read_file, write and check, got 2 of \
+         them",
     ),
     ("at = \"SO\"\n", "at = \"II\"\n", "subdevice[1].startup[3].at: II is in INIT, which has no mailbox"),
     (
@@ -100,6 +101,12 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("elements = 0x48", "elements = 0", "subdevice[1].startup[8].read_idn.elements: expected at least one bit, got 0"),
     ("aoe = \"05 06", "aoe = \"06", "subdevice[1].startup[9].aoe: expected an AMS header with a request"),
     ("voe = \"47 0c 00 00", "voe = \"47 0c", "subdevice[1].startup[10].voe: expected vendor, type and data"),
+    ("name = \"gains.txt\"", "name = \"\"", "subdevice[1].startup[13].write_file.name: expected the name of a file"),
+    (
+        "name = \"log.txt\"",
+        "name = \"\\u0000\"",
+        "subdevice[1].startup[14].read_file.name: expected the name of a file",
+    ),
     (
         "index = 0x8020, complete = true",
         "index = 0x8020, sub = 2, complete = true",

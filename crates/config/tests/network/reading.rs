@@ -4,7 +4,9 @@ use std::time::Duration;
 
 use ringcat_config::network::NetworkFile;
 use ringcat_engine::JunctionMode;
-use ringcat_engine::config::{ConfigAddress, IdnRead, MailMessage, StartupAction, Transition, Watchdog};
+use ringcat_engine::config::{
+    ConfigAddress, FileRead, FileWrite, IdnRead, MailMessage, StartupAction, Transition, Watchdog,
+};
 use ringcat_engine::declared::GroupId;
 use ringcat_engine::info::Direction;
 use ringcat_engine::layout::LrwPolicy;
@@ -71,13 +73,16 @@ fn every_key_is_in_the_declaration() {
     assert!(drive.sii_to_pdi);
     let transitions: Vec<Transition> = drive.startup.iter().map(|command| command.transition).collect();
     use Transition::{Bi, Ii, Ip, Os, Pi, Pp, Ps, So, Sp, Ss};
-    assert_eq!(transitions, [Ip, Ps, Ps, So, Ps, Os, Sp, Ps, Pi, Bi, Ss, Ii, Pp]);
+    assert_eq!(transitions, [Ip, Ps, Ps, So, Ps, Os, Sp, Ps, Pi, Bi, Ss, Ii, Pp, Ip, Ps]);
     let read = IdnRead::new(2, Idn(11)).with_elements(SoeElements(0x48)).with_expected(vec![1, 2]);
     assert_eq!(drive.startup[8].action, StartupAction::IdnRead(read));
     assert!(matches!(&drive.startup[9].action, StartupAction::Mail(MailMessage::Aoe(data)) if data.len() == 32));
     let voe = MailMessage::Voe(vec![0x47, 0x0C, 0, 0, 7, 0]);
     assert_eq!(drive.startup[10].action, StartupAction::Mail(voe));
     assert_eq!(drive.startup[12].action, StartupAction::IdnRead(IdnRead::new(0, Idn(11))));
+    let gains = FileWrite::new("gains.txt", b"1\n").with_password(0x0102_0304);
+    assert_eq!(drive.startup[13].action, StartupAction::FileWrite(gains));
+    assert_eq!(drive.startup[14].action, StartupAction::FileRead(FileRead::new("log.txt")));
     assert!(matches!(&drive.startup[1].action, StartupAction::Sdo(sdo) if sdo.complete_access));
     assert_eq!(drive.startup[0].comment.as_deref(), Some("ramp of \\ 1 s"));
     let members: Vec<Vec<(usize, Option<Vec<u8>>)>> = declaration

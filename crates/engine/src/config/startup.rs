@@ -260,6 +260,56 @@ impl MailMessage {
     }
 }
 
+/// A write of a file (FoE).
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub struct FileWrite {
+    /// Name of the file.
+    pub name: String,
+    /// Password, 0 for none.
+    pub password: u32,
+    /// Its contents.
+    pub data: Vec<u8>,
+}
+
+impl FileWrite {
+    /// A write without a password.
+    pub fn new(name: impl Into<String>, data: impl Into<Vec<u8>>) -> FileWrite {
+        FileWrite { name: name.into(), password: 0, data: data.into() }
+    }
+
+    /// Sets [`FileWrite::password`].
+    #[must_use]
+    pub const fn with_password(mut self, password: u32) -> FileWrite {
+        self.password = password;
+        self
+    }
+}
+
+/// A read of a file (FoE) of at most 64 KiB. An event reports its contents.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub struct FileRead {
+    /// Name of the file.
+    pub name: String,
+    /// Password, 0 for none.
+    pub password: u32,
+}
+
+impl FileRead {
+    /// A read without a password.
+    pub fn new(name: impl Into<String>) -> FileRead {
+        FileRead { name: name.into(), password: 0 }
+    }
+
+    /// Sets [`FileRead::password`].
+    #[must_use]
+    pub const fn with_password(mut self, password: u32) -> FileRead {
+        self.password = password;
+        self
+    }
+}
+
 /// Action of a start-up command.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
@@ -278,6 +328,10 @@ pub enum StartupAction {
     IdnRead(IdnRead),
     /// A message of AoE or VoE.
     Mail(MailMessage),
+    /// FoE write.
+    FileWrite(FileWrite),
+    /// FoE read.
+    FileRead(FileRead),
 }
 
 /// A start-up command.

@@ -8,11 +8,10 @@ use ringcat_wire::address::{LogicalAddress, Position, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::mailbox::Protocol;
 use ringcat_wire::mailbox::coe::Emergency;
-use ringcat_wire::mailbox::soe::Idn;
 
 use crate::declared::{Address, SubDeviceId};
 use crate::domain::DomainId;
-use crate::event::Event;
+use crate::event::{Event, StartupSource};
 use crate::link::Link;
 
 /// An event that a procedure reports itself; the reason why it is no fact of the model.
@@ -66,28 +65,11 @@ pub(crate) enum Notice {
         subdevice: SubDeviceId,
         /// Number of the command.
         number: usize,
-        /// Index of the object.
-        index: u16,
-        /// Subindex of the object.
-        sub_index: u8,
+        /// What was read.
+        source: StartupSource,
         /// Purpose of the command.
         comment: Option<String>,
         /// The value.
-        data: Vec<u8>,
-    },
-    /// A start-up command has read an IDN for the application.
-    StartupIdn {
-        /// Index in the declaration.
-        subdevice: SubDeviceId,
-        /// Number of the command.
-        number: usize,
-        /// Drive of the SubDevice.
-        drive: u8,
-        /// The IDN.
-        idn: Idn,
-        /// Purpose of the command.
-        comment: Option<String>,
-        /// The data.
         data: Vec<u8>,
     },
     /// A mail of a SubDevice to the application.
@@ -127,11 +109,8 @@ impl From<Notice> for Event {
             Notice::Resumed { subdevices, in_state, differs } => Event::Resumed { subdevices, in_state, differs },
             Notice::ConversationCut { position, protocol } => Event::ConversationCut { position, protocol },
             Notice::CannotDisconnect { link } => Event::CannotDisconnect { link },
-            Notice::StartupRead { subdevice, number, index, sub_index, comment, data } => {
-                Event::StartupRead { subdevice, number, index, sub_index, comment, data }
-            }
-            Notice::StartupIdn { subdevice, number, drive, idn, comment, data } => {
-                Event::StartupIdn { subdevice, number, drive, idn, comment, data }
+            Notice::StartupRead { subdevice, number, source, comment, data } => {
+                Event::StartupRead { subdevice, number, source, comment, data }
             }
             Notice::Emergency { subdevice, emergency } => Event::Emergency { subdevice, emergency },
             Notice::CyclicCommand { domain, command, logical, length, expected, got, cycles, subdevices } => {

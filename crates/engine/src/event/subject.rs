@@ -122,7 +122,7 @@ impl Event {
             | Event::PlanOddity { .. }
             | Event::GroupJoined { .. }
             | Event::GroupLeft { .. } => Subject::States,
-            Event::StartupRead { .. } | Event::StartupIdn { .. } => Subject::States,
+            Event::StartupRead { .. } => Subject::States,
             Event::ConversationCut { .. } | Event::Emergency { .. } => Subject::Mail,
             Event::Domain { .. } | Event::Skipped { .. } => Subject::Domains,
             Event::CyclicCommand { .. } | Event::AcyclicCommand { .. } => Subject::Commands,

@@ -55,6 +55,7 @@ pub(super) struct SupportedProtocols {
     eoe: bool,
     aoe: bool,
     voe: bool,
+    foe: bool,
 }
 
 impl SupportedProtocols {
@@ -68,6 +69,7 @@ impl SupportedProtocols {
             eoe: mailbox && (declared || protocols.eoe()),
             aoe: mailbox && (declared || protocols.aoe()),
             voe: mailbox && (declared || protocols.voe()),
+            foe: mailbox && (declared || protocols.foe()),
         }
     }
 }
@@ -94,6 +96,9 @@ pub(super) fn command(supported: SupportedProtocols, command: &StartupCommand) -
         StartupAction::Ip(_) if !supported.eoe => Err(PlanProblem::NoEoe),
         StartupAction::Mail(MailMessage::Aoe(_)) if !supported.aoe => Err(PlanProblem::NoProtocol("AoE")),
         StartupAction::Mail(MailMessage::Voe(_)) if !supported.voe => Err(PlanProblem::NoProtocol("VoE")),
+        StartupAction::FileWrite(_) | StartupAction::FileRead(_) if !supported.foe => {
+            Err(PlanProblem::NoProtocol("FoE"))
+        }
         StartupAction::Mail(message) if !message.is_sound() => Err(PlanProblem::Message),
         StartupAction::Register(command) if !command.is_sound() => {
             let (data, mask) = command.lengths();
@@ -104,6 +109,8 @@ pub(super) fn command(supported: SupportedProtocols, command: &StartupCommand) -
         | StartupAction::Idn(_)
         | StartupAction::IdnRead(_)
         | StartupAction::Mail(_)
+        | StartupAction::FileWrite(_)
+        | StartupAction::FileRead(_)
         | StartupAction::Ip(_)
         | StartupAction::Register(_) => Ok(()),
     }

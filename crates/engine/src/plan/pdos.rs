@@ -53,6 +53,8 @@ fn writes_pdos(config: &SubDeviceConfig) -> bool {
         | StartupAction::Idn(_)
         | StartupAction::IdnRead(_)
         | StartupAction::Mail(_)
+        | StartupAction::FileWrite(_)
+        | StartupAction::FileRead(_)
         | StartupAction::Ip(_)
         | StartupAction::Register(_) => false,
     })

@@ -24,6 +24,7 @@ use crate::mail::MailboxError;
 use crate::mail::aoe::AoeError;
 use crate::mail::coe::SdoFailure;
 use crate::mail::eoe::EoeFailure;
+use crate::mail::foe::FoeFailure;
 use crate::mail::soe::SoeFailure;
 use crate::segment::effect::{Check, Shown};
 use crate::segment::member::Member;
@@ -110,6 +111,9 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
         }
         ConfigureError::Startup { error: StartupError::Eoe(error), .. } => {
             matches!(error.cause, EoeFailure::Mailbox(MailboxError::Bus(_) | MailboxError::Closed))
+        }
+        ConfigureError::Startup { error: StartupError::Foe(error), .. } => {
+            matches!(error.cause, FoeFailure::Mailbox(MailboxError::Bus(_) | MailboxError::Closed))
         }
         ConfigureError::Startup { error: StartupError::Register(error), .. } => {
             matches!(error.cause, RegisterFailure::Bus(_))

@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
+use ringcat::network::LoadedNetwork;
 use ringcat::{DomainId, EmergencyRing, RegisterRequest, SdoRequest, SoeRequest, SubDeviceId, VoeHandler};
 
 use super::handle::{Ending, Handle, Kind, bury, ending, give};
@@ -20,6 +21,8 @@ pub struct Owner {
     children: Mutex<Vec<Ending>>,
     /// Handles of SubDevices by their index.
     slaves: Mutex<Vec<Option<usize>>>,
+    /// Handles of the domains of a network file by their number.
+    domains: Mutex<Vec<usize>>,
 }
 
 /// Behind `ec_master_t`.
@@ -77,7 +80,7 @@ kinds! {
 impl Owner {
     /// A master without further handles.
     pub fn new(master: Master) -> Owner {
-        Owner { master, children: Mutex::default(), slaves: Mutex::default() }
+        Owner { master, children: Mutex::default(), slaves: Mutex::default(), domains: Mutex::default() }
     }
 
     /// Makes a handle that ends with the application.
@@ -90,8 +93,32 @@ impl Owner {
     /// Ends all handles but that of the master.
     pub fn end_children(&self) {
         locked(&self.slaves).clear();
+        locked(&self.domains).clear();
         let children = std::mem::take(&mut *locked(&self.children));
         children.into_iter().for_each(bury);
+    }
+
+    /// Declares the network of a file.
+    ///
+    /// # Errors
+    /// The application is active, something is declared already, or the file does not fit the bus.
+    pub fn load(self: &Arc<Owner>, file: &LoadedNetwork) -> Outcome {
+        self.master.load(file)?;
+        let domains = self.master.look(|draft| draft.domains().to_vec())?;
+        let handles = (0..).zip(domains).map(|(number, words)| {
+            self.give_child(DomainObject { owner: self.clone(), id: DomainId(number), words }) as usize
+        });
+        *locked(&self.domains) = handles.collect();
+        Ok(())
+    }
+
+    /// The handle of a domain of a network file: always the same one.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn domain(&self, id: DomainId) -> Outcome<*mut ec_domain_t> {
+        let address = locked(&self.domains).get(id.0).copied().ok_or(Code::NOT_FOUND)?;
+        Ok(address as *mut ec_domain_t)
     }
 
     /// The index of the SubDevice with a name, which is declared if it was not.

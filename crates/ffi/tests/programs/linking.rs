@@ -51,12 +51,14 @@ fn both_command_lines_of_the_manual_link_without_a_further_library() {
 
 // covers: c-interface
 #[test]
-fn the_archive_shows_the_functions_of_ecrt_h_only() {
+fn the_archive_shows_the_functions_of_both_headers_only() {
     let Some(prefix) = installed() else { return };
     let archive = prefix.join("lib/libethercat.a");
     let symbols = run(Command::new("nm").args(["--extern-only", "--defined-only"]).arg(archive));
     let names: BTreeSet<&str> = symbols.lines().filter_map(|line| line.split_whitespace().nth(2)).collect();
-    assert!(names.len() == 103 && names.iter().all(|name| name.starts_with("ecrt_")), "{names:?}");
+    let (added, ecrt): (Vec<&str>, Vec<&str>) = names.iter().partition(|name| name.starts_with("ringcat_master_"));
+    assert_eq!((added.len(), ecrt.len()), (4, 103), "{names:?}");
+    assert!(ecrt.iter().all(|name| name.starts_with("ecrt_")), "{names:?}");
 }
 
 // covers: c-interface
@@ -130,6 +132,7 @@ fn the_prefix_of_the_manual_has_its_layout_and_no_file_names_the_build() {
     found.sort_unstable();
     let expected = [
         "include/ecrt.h",
+        "include/ringcat.h",
         "lib/cmake/EtherCAT/EtherCATConfig.cmake",
         "lib/cmake/EtherCAT/EtherCATConfigVersion.cmake",
         "lib/cmake/ethercat/ethercat-config-version.cmake",

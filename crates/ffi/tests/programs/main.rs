@@ -12,6 +12,7 @@ mod library;
 mod linking;
 mod lost;
 mod machine;
+mod network;
 mod operator;
 mod readme;
 mod shape;

@@ -1,6 +1,6 @@
 //! Lines for states, configuration and messages of SubDevices.
 
-use ringcat_engine::event::Event;
+use ringcat_engine::event::{Event, StartupSource};
 use ringcat_engine::ring_status::Occupant;
 
 use super::names::Names;
@@ -45,15 +45,13 @@ pub(super) fn describe(event: &Event, names: &Names, ends: [Option<Occupant>; 2]
             let (name, place) = (names.of(*subdevice), names.at(*position, ends[0]));
             format!("{name}: expected {field} {expected:#010x}, {place} has {got:#010x}: it is not configured")
         }
-        Event::StartupRead { subdevice, number, index, sub_index, comment, data } => {
+        Event::StartupRead { subdevice, number, source, comment, data } => {
             let comment = comment.as_ref().map_or_else(String::new, |comment| format!(" \"{comment}\""));
-            let object = format!("{index:#06x}:{sub_index:02x}");
-            format!("{}: start-up command {number}{comment} read {object}: {}", names.of(*subdevice), hex(data))
-        }
-        Event::StartupIdn { subdevice, number, drive, idn, comment, data } => {
-            let comment = comment.as_ref().map_or_else(String::new, |comment| format!(" \"{comment}\""));
-            let name = names.of(*subdevice);
-            format!("{name}: start-up command {number}{comment} read {idn} of drive {drive}: {}", hex(data))
+            let contents = match source {
+                StartupSource::File { .. } => format!("{} bytes", data.len()),
+                _ => hex(data),
+            };
+            format!("{}: start-up command {number}{comment} read {source}: {contents}", names.of(*subdevice))
         }
         Event::Emergency { subdevice, emergency } => {
             let (code, register) = (emergency.error_code, emergency.error_register);

@@ -129,3 +129,52 @@ fn a_network_file_of_100_subdevices_takes_less_than_2_s_beyond_the_scan() {
     assert!(took < Duration::from_secs(2), "{took:?}");
     assert_eq!(network.file.to_text(), text);
 }
+
+/// Judged by the outputs of the simulated terminals.
+// covers: network-file, sim-files
+#[test]
+fn a_simulated_segment_of_a_network_file_reaches_op_with_the_file() {
+    let (_, scan) = scanned(&segment(2, 2));
+    let mut options = ScanOptions::new("machine", PERIOD);
+    (options.ring, options.clocks) = (true, true);
+    let mut file = NetworkFile::from_scan(&scan.subdevices, &scan.topology, &options);
+    let alone = |subdevice: &mut SubDevice| {
+        (subdevice.position, subdevice.alias, subdevice.offset) = (None, Some(77), Some(0));
+    };
+    alone(&mut file.subdevice[3]);
+    file.subdevice[6].check_revision = ringcat::config::network::model::CheckRevision::EqualOrGreater;
+    file.subdevice[6].optional = true;
+    let network = LoadedNetwork::from_bytes("machine.toml", file.to_text().as_bytes()).expect("the file is valid");
+    for ring in [true, false] {
+        let simulated = network.simulated(ring).expect("the file has all that a device is made of");
+        assert_eq!(simulated.devices().len(), file.subdevice.len());
+        let mut main_device = MainDevice::request(SimulatedSegment::new(simulated), &Options::default());
+        let scan = main_device.scan().expect("the scan succeeds");
+        assert_eq!(scan.subdevices[3].alias, 77);
+        assert_eq!(network.configuration.compare(&scan.subdevices), []);
+        let mut application = main_device.activate(network.declaration()).expect("the network is the one of the file");
+        let mut image = EniImage::new(&network.configuration, application.directory()).expect("the image fits");
+        let lamp = image.variable("digital-output-8 3.Channel 3.Output").expect("a lamp").clone();
+        application.wait_until_op(LIMIT).expect("all SubDevices reach OP");
+        for _ in 0..20 {
+            application.cycle(|data| {
+                image.take_inputs(data);
+                image.write(&lamp, 1);
+                image.give_outputs(data);
+            });
+        }
+        let device = |at| application.links().network().device(ringcat::sim::cable::DeviceIndex(at));
+        assert_eq!(device(3).outputs(), [0b100]);
+    }
+}
+
+// covers: network-file
+#[test]
+fn what_a_simulated_segment_is_not_made_of_is_named() {
+    let (_, scan) = scanned(&segment(1, 1));
+    let mut file = NetworkFile::from_scan(&scan.subdevices, &scan.topology, &ScanOptions::new("machine", PERIOD));
+    file.subdevice[1].sync_manager[0].start = None;
+    let network = LoadedNetwork::from_bytes("machine.toml", file.to_text().as_bytes()).expect("the file is valid");
+    let error = network.simulated(false).expect_err("the address is missing").to_string();
+    assert!(error.contains("digital-output-8") && error.contains("start"), "{error}");
+}

@@ -4,8 +4,8 @@
 use std::time::Duration;
 
 use ringcat::{
-    Event, Options, RegisterAccess, RegisterCommand, Scan, SdoUpload, StartupAction, StartupCommand, SubDeviceId,
-    Transition, automatic,
+    Event, Options, RegisterAccess, RegisterCommand, Scan, SdoUpload, StartupAction, StartupCommand, StartupSource,
+    SubDeviceId, Transition, automatic,
 };
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::description::DeviceDescription;
@@ -165,12 +165,13 @@ fn objects_are_read_and_compared_or_reported() {
     let mut world = world(&[upload(0x2001, 7, Some(&[7, 0])), upload(0x2003, 2, None)]);
     world.settle();
     let read = world.events(world.beginning()).iter().filter_map(|timed| match &timed.event {
-        Event::StartupRead { subdevice: SubDeviceId(DRIVE), number, index, sub_index, comment, data } => {
-            Some((*number, *index, *sub_index, comment.clone(), data.clone()))
+        Event::StartupRead { subdevice: SubDeviceId(DRIVE), number, source, comment, data } => {
+            Some((*number, source.clone(), comment.clone(), data.clone()))
         }
         _ => None,
     });
-    let told = (1, 0x2003, 2, Some("a look".to_owned()), 50_000u32.to_le_bytes().to_vec());
+    let source = StartupSource::Object { index: 0x2003, sub_index: 2 };
+    let told = (1, source, Some("a look".to_owned()), 50_000u32.to_le_bytes().to_vec());
     assert_eq!(read.collect::<Vec<_>>(), [told]);
     let text = failure(self::world(&[upload(0x2001, 7, Some(&[8, 0]))]));
     assert_eq!(text, "start-up command 0 (PREOP to SAFEOP) \"a look\": SDO 0x2001:07: expected 08 00, got 07 00");

@@ -1,7 +1,9 @@
-//! Start-up commands that read IDNs, or send messages of AoE and VoE: judged by what the SubDevice has served.
+//! Start-up commands that read IDNs, transfer files, or send messages of AoE and VoE: judged by what the SubDevice has
+//! served.
 
 use ringcat::{
-    Event, IdnRead, MailMessage, Options, Scan, StartupAction, StartupCommand, SubDeviceId, Transition, automatic,
+    Event, FileRead, FileWrite, IdnRead, MailMessage, Options, Scan, StartupAction, StartupCommand, StartupSource,
+    SubDeviceId, Transition, automatic,
 };
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::network::NetworkOptions;
@@ -81,13 +83,14 @@ fn idns_are_read_and_compared_or_reported() {
         .events(world.beginning())
         .iter()
         .filter_map(|timed| match &timed.event {
-            Event::StartupIdn { subdevice: SubDeviceId(DRIVE), number, drive, idn, comment, data } => {
-                Some((*number, *drive, *idn, comment.clone(), data.clone()))
+            Event::StartupRead { subdevice: SubDeviceId(DRIVE), number, source, comment, data } => {
+                Some((*number, source.clone(), comment.clone(), data.clone()))
             }
             _ => None,
         })
         .collect();
-    assert_eq!(told, [(1, 0, Idn::standard(0, 1), Some("a look".to_owned()), held)]);
+    let source = StartupSource::Idn { drive: 0, idn: Idn::standard(0, 1) };
+    assert_eq!(told, [(1, source, Some("a look".to_owned()), held)]);
 }
 
 // covers: 6.6, startup-commands
@@ -147,4 +150,58 @@ fn a_refused_message_of_aoe_and_messages_without_a_header_are_reported() {
     }
     let early = try_world(&[(Transition::Ii, StartupAction::IdnRead(read(1)))]).expect_err("it was taken");
     assert!(early.contains("INIT has no mailbox"), "{early}");
+}
+
+/// A file in the device.
+fn held(world: &World, name: &str) -> Option<Vec<u8>> {
+    let files = world.network().device(DeviceIndex(DRIVE)).application.files();
+    files.file(name.as_bytes()).map(<[u8]>::to_vec)
+}
+
+// covers: 6.4, startup-commands
+#[test]
+fn files_are_written_at_each_return_and_read_for_an_event() {
+    // No packet, a full one, and more than one packet of the mailbox.
+    for length in [0, 116, 1000] {
+        let contents: Vec<u8> = (0..length).map(|byte| byte as u8).collect();
+        let mut world = world(&[
+            (Transition::Ip, StartupAction::FileWrite(FileWrite::new("gains.txt", contents.clone()))),
+            (Transition::Ps, StartupAction::FileRead(FileRead::new("log.txt"))),
+        ]);
+        assert_eq!(held(&world, "gains.txt"), Some(contents.clone()));
+        let read: Vec<_> = world
+            .events(world.beginning())
+            .iter()
+            .filter_map(|timed| match &timed.event {
+                Event::StartupRead { subdevice: SubDeviceId(DRIVE), number, source, comment, data } => {
+                    Some((*number, source.clone(), comment.clone(), data.clone()))
+                }
+                _ => None,
+            })
+            .collect();
+        let source = StartupSource::File { name: "log.txt".to_owned() };
+        let log = b"nothing happened\n".repeat(100);
+        assert_eq!(read, [(1, source, Some("a look".to_owned()), log)]);
+        world.network_mut().device_mut(DeviceIndex(DRIVE)).application.record_mail();
+        world.power_off(DeviceIndex(DRIVE));
+        world.run_cycles(20);
+        world.power_on(DeviceIndex(DRIVE));
+        world.settle();
+        let first = served(&world, Protocol::Foe).into_iter().next();
+        let request = [&[2, 0, 0, 0, 0, 0][..], b"gains.txt"].concat();
+        assert_eq!(first, Some((AlState::PreOp, request)));
+        assert_eq!(held(&world, "gains.txt"), Some(contents));
+    }
+}
+
+// covers: 6.4, startup-commands
+#[test]
+fn a_missing_and_a_refused_file_are_reported() {
+    let text = failure(StartupAction::FileRead(FileRead::new("none.txt")));
+    assert!(text.starts_with("start-up command 0 (PREOP to SAFEOP) \"a look\": FoE \"none.txt\": "), "{text}");
+    // It is written in BOOT only.
+    let text = failure(StartupAction::FileWrite(FileWrite::new("firmware.bin", [0; 10])));
+    assert!(text.starts_with("start-up command 0 (PREOP to SAFEOP) \"a look\": FoE \"firmware.bin\": "), "{text}");
+    let early = try_world(&[(Transition::Ii, StartupAction::FileRead(FileRead::new("log.txt")))]);
+    assert!(early.expect_err("it was taken").contains("INIT has no mailbox"));
 }

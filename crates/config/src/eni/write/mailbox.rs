@@ -38,19 +38,21 @@ pub(super) fn first(of: &Mailbox) -> Option<Place> {
     coe.chain(soe).chain(eoe).chain(of.others.iter().map(|it| it.place)).min()
 }
 
-/// The protocols with commands, in the order of their first commands.
+/// The protocols in the order of the schema; where their commands are in another order, in that of their first
+/// commands.
 fn protocols(out: &mut Elements, of: &Mailbox) {
     let raw = |name: &str| of.others.iter().filter(|it| it.protocol == name).collect::<Vec<&RawMailCommand>>();
-    let place = |places: Option<Place>| places.unwrap_or_default();
     let mut order = [
-        ("CoE", place(of.coe.first().map(|it| it.place))),
-        ("SoE", place(of.soe.first().map(|it| it.place))),
-        ("AoE", place(raw("AoE").first().map(|it| it.place))),
-        ("EoE", place(of.eoe.first().map(|it| it.place))),
-        ("FoE", place(raw("FoE").first().map(|it| it.place))),
-        ("VoE", place(raw("VoE").first().map(|it| it.place))),
+        ("CoE", of.coe.first().map(|it| it.place)),
+        ("SoE", of.soe.first().map(|it| it.place)),
+        ("AoE", raw("AoE").first().map(|it| it.place)),
+        ("EoE", of.eoe.first().map(|it| it.place)),
+        ("FoE", raw("FoE").first().map(|it| it.place)),
+        ("VoE", raw("VoE").first().map(|it| it.place)),
     ];
-    order.sort_by_key(|(_, place)| *place);
+    if !order.iter().filter_map(|(_, place)| *place).is_sorted() {
+        order.sort_by_key(|(_, place)| place.unwrap_or_default());
+    }
     for (name, _) in order {
         match name {
             "CoE" => protocol(out, name, &of.coe, None, coe),

@@ -6,13 +6,12 @@ use ringcat_engine::info::Direction;
 use ringcat_wire::address::LogicalAddress;
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::OVERHEAD;
-use ringcat_wire::register::map;
 
 use super::{Layout, Stream, Window, bytes};
 use crate::configuration::Configuration;
 use crate::eni::{CopyInfo, CyclicCommand, CyclicState, CyclicTask, Datagram, Frame, Place, Target};
-use crate::export::clocks;
 use crate::export::error::ExportError;
+use crate::export::service;
 use crate::xml::one_line;
 
 /// Bytes of the datagrams of a frame (protocol 1.3).
@@ -25,10 +24,9 @@ impl Layout {
     pub fn tasks(&self, whole: &Configuration, names: &[String]) -> Result<Vec<CyclicTask>, ExportError> {
         let copies = copies(whole)?;
         let domains = &whole.declaration.domains;
-        let without_data = domains.is_empty() && (whole.cycle.is_some() || whole.declaration.clocks.is_some());
         let task = |number: usize| {
             let period = domains.get(number).map(|domain| domain.period).or(whole.cycle);
-            let mut commands = if number == 0 { supervision(whole) } else { Vec::new() };
+            let mut commands = if number == 0 { service::commands(whole) } else { Vec::new() };
             for ((_, stream), window) in self.windows.range((number, Stream::Outputs)..=(number, Stream::Both)) {
                 commands.extend(window.commands.iter().map(|areas| command(whole, window, *stream, areas, &copies)));
             }
@@ -40,29 +38,8 @@ impl Layout {
                 frames: frames(commands),
             }
         };
-        Ok((0..domains.len() + usize::from(without_data)).map(task).collect())
+        Ok((0..service::tasks(whole)).map(task).collect())
     }
-}
-
-/// What the first task has besides process data: the time, the states.
-fn supervision(whole: &Configuration) -> Vec<CyclicCommand> {
-    let count = u16::try_from(whole.declaration.subdevices.len()).ok().filter(|_| whole.groups.is_empty());
-    let mut commands = clocks::cyclic(whole);
-    commands.push(CyclicCommand {
-        place: Place::default(),
-        states: vec![CyclicState::PreOp, CyclicState::SafeOp, CyclicState::Op],
-        comment: "states of all".to_owned(),
-        datagram: Datagram {
-            command: Command::Brd,
-            target: Target::Register { adp: 0, ado: map::AL_STATUS },
-            data: vec![0; 2],
-            count,
-        },
-        input_offset: None,
-        output_offset: None,
-        copies: Vec::new(),
-    });
-    commands
 }
 
 /// The command for areas without a gap.
@@ -96,8 +73,8 @@ fn command(
             data: vec![0; end - begin],
             count: u16::try_from(count).ok(),
         },
-        input_offset: (readers > 0).then_some(offset),
-        output_offset: (writers > 0).then_some(offset),
+        input_offset: Some(offset),
+        output_offset: Some(offset),
         copies: areas.iter().filter_map(|area| copies.get(area)).flatten().copied().collect(),
     }
 }

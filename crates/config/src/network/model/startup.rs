@@ -6,8 +6,8 @@ use serde::Deserialize;
 
 use crate::network::values::{Bytes, Mac, Time};
 
-/// A start-up command. It has one of the keys `sdo`, `upload`, `idn`, `read_idn`, `ip`, `aoe`, `voe`, `write` and
-/// `check`.
+/// A start-up command. It has one of the keys `sdo`, `upload`, `idn`, `read_idn`, `ip`, `aoe`, `voe`, `write_file`,
+/// `read_file`, `write` and `check`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -29,6 +29,10 @@ pub struct Startup {
     pub aoe: Option<Bytes>,
     /// VoE: vendor, type and data of a message.
     pub voe: Option<Bytes>,
+    /// Write of a file (FoE).
+    pub write_file: Option<WriteFile>,
+    /// Read of a file (FoE) of at most 64 KiB.
+    pub read_file: Option<ReadFile>,
     /// Register write.
     pub write: Option<Write>,
     /// Register that must have a value.
@@ -135,6 +139,32 @@ pub struct ReadIdn {
     pub elements: Option<u8>,
     /// Required data; any data if the key is missing.
     pub data: Option<Bytes>,
+}
+
+/// A write of a file.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct WriteFile {
+    /// Name of the file in the SubDevice.
+    pub name: String,
+    /// Password, 0 for none.
+    #[serde(default)]
+    pub password: u32,
+    /// Its contents.
+    pub data: Bytes,
+}
+
+/// A read of a file.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct ReadFile {
+    /// Name of the file in the SubDevice.
+    pub name: String,
+    /// Password, 0 for none.
+    #[serde(default)]
+    pub password: u32,
 }
 
 /// IP parameters behind a SubDevice.

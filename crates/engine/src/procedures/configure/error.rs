@@ -10,6 +10,7 @@ use crate::mail::MailboxError;
 use crate::mail::aoe::AoeError;
 use crate::mail::coe::{SdoAddress, SdoError};
 use crate::mail::eoe::EoeError;
+use crate::mail::foe::FoeError;
 use crate::mail::soe::{SoeAddress, SoeError};
 use crate::procedures::al_state::StateError;
 use crate::procedures::clocks::{NotLocked, SignalsError};
@@ -77,6 +78,8 @@ pub enum StartupError {
     Aoe(AoeError),
     /// VoE.
     Voe(MailboxError),
+    /// FoE.
+    Foe(FoeError),
     /// An IDN holds other data than required.
     IdnValue {
         /// The elements that were read.
@@ -127,6 +130,7 @@ impl fmt::Display for StartupError {
             }
             StartupError::Aoe(error) => error.fmt(f),
             StartupError::Voe(error) => write!(f, "VoE: {error}"),
+            StartupError::Foe(error) => error.fmt(f),
             StartupError::Register(error) => error.fmt(f),
         }
     }
@@ -161,6 +165,7 @@ impl core::error::Error for StartupError {
             StartupError::Eoe(error) => Some(error),
             StartupError::Aoe(error) => Some(error),
             StartupError::Voe(error) => Some(error),
+            StartupError::Foe(error) => Some(error),
             StartupError::Register(error) => Some(error),
             _ => None,
         }

@@ -1,19 +1,23 @@
 //! Start-up commands of a transition, executed in the order of the declaration.
 
+use alloc::vec::Vec;
 use core::time::Duration;
 
 use super::{BringUp, ConfigureError, StartupError};
 use crate::config::{
-    IdnRead, IdnWrite, MailMessage, SdoDownload, SdoUpload, StartupAction, StartupCommand, Transition,
+    FileRead, FileWrite, IdnRead, IdnWrite, MailMessage, SdoDownload, SdoUpload, StartupAction, StartupCommand,
+    Transition,
 };
 use crate::declared::SubDeviceId;
-use crate::event::Notice;
+use crate::event::{Notice, StartupSource};
 use crate::mail::Limits;
 use crate::mail::coe::{self, SdoAddress};
+use crate::mail::foe::FoeOptions;
 use crate::mail::soe::{self, SoeAddress};
-use crate::mail::{aoe, eoe, voe};
+use crate::mail::stream::{Bounded, Bytes};
+use crate::mail::{aoe, eoe, foe, voe};
 
-/// Longest object that a start-up command reads.
+/// Longest object or file that a start-up command reads.
 const MAX_READ: usize = 0x1_0000;
 
 impl BringUp<'_> {
@@ -68,6 +72,12 @@ impl BringUp<'_> {
                 let limit = command.limit.unwrap_or(timeouts.mailbox_request);
                 voe::send_whole(&self.mailbox, message, limit).await.map_err(StartupError::Voe)
             }
+            StartupAction::FileWrite(FileWrite { name, password, data }) => {
+                let options = file_options(*password, command, timeouts.mailbox_request);
+                let written = foe::write(&self.mailbox, name, options, &mut Bytes::new(data), |_| {}).await;
+                written.map(|_| ()).map_err(StartupError::Foe)
+            }
+            StartupAction::FileRead(read) => self.read_file(number, command, read).await,
             StartupAction::Ip(settings) => {
                 eoe::set_ip(&self.mailbox, 0, settings, limits(timeouts.eoe)).await.map_err(StartupError::Eoe)
             }
@@ -91,15 +101,7 @@ impl BringUp<'_> {
             }
             Some(_) => Ok(()),
             None => {
-                let (subdevice, comment) = (self.index, command.comment.clone());
-                self.bus.notice(Notice::StartupRead {
-                    subdevice: SubDeviceId(subdevice),
-                    number,
-                    index,
-                    sub_index,
-                    comment,
-                    data,
-                });
+                self.report(number, command, StartupSource::Object { index, sub_index }, data);
                 Ok(())
             }
         }
@@ -121,10 +123,31 @@ impl BringUp<'_> {
             }
             Some(_) => Ok(()),
             None => {
-                let (subdevice, comment) = (SubDeviceId(self.index), command.comment.clone());
-                self.bus.notice(Notice::StartupIdn { subdevice, number, drive, idn, comment, data });
+                self.report(number, command, StartupSource::Idn { drive, idn }, data);
                 Ok(())
             }
         }
     }
+
+    async fn read_file(&self, number: usize, command: &StartupCommand, read: &FileRead) -> Result<(), StartupError> {
+        let FileRead { name, password } = read;
+        let mut contents = Bounded::new(MAX_READ);
+        let options = file_options(*password, command, self.config.timeouts.mailbox_request);
+        foe::read(&self.mailbox, name, options, &mut contents, |_| {}).await.map_err(StartupError::Foe)?;
+        self.report(number, command, StartupSource::File { name: name.clone() }, contents.into_bytes());
+        Ok(())
+    }
+
+    /// Reports what a command without a required value has read.
+    fn report(&self, number: usize, command: &StartupCommand, source: StartupSource, data: Vec<u8>) {
+        let (subdevice, comment) = (SubDeviceId(self.index), command.comment.clone());
+        self.bus.notice(Notice::StartupRead { subdevice, number, source, comment, data });
+    }
+}
+
+/// A message has the limit of its command, else that of FoE.
+fn file_options(password: u32, command: &StartupCommand, request: Duration) -> FoeOptions {
+    let usual = FoeOptions::default();
+    let answer = command.limit.unwrap_or(usual.limits.answer);
+    usual.with_password(password).with_limits(Limits::new(request, answer))
 }

@@ -6,12 +6,13 @@ use std::time::Duration;
 use ringcat_config::eni::{BitRange, Eni, Mailbox, MailboxBuffer, PdoEntry, SubDevice, Target};
 use ringcat_engine::config::{
     ConfigAddress, DeclaredArea, DeclaredSyncManager, PdoAssignment, PdoEntry as ConfigEntry, PdoMapping,
-    SubDeviceConfig, SyncManagerRole,
+    StartupAction, SubDeviceConfig, SyncManagerRole,
 };
 use ringcat_engine::info::Direction;
 use ringcat_sim::application::{Behaviour, InputSource};
 use ringcat_sim::description::{
-    DcDescription, DeviceDescription, MailboxDescription, PdoDescription, PdoEntryDescription, SyncManagerDescription,
+    DcDescription, DeviceDescription, FoeDescription, MailboxDescription, PdoDescription, PdoEntryDescription,
+    SyncManagerDescription,
 };
 use ringcat_wire::register::{PortKind, SyncManager, SyncManagerControl};
 use ringcat_wire::sii::{
@@ -70,10 +71,26 @@ pub(super) fn describe(subdevice: &SubDevice, config: &SubDeviceConfig) -> Devic
     device.fmmus.resize(device.fmmus.len().max(4), FmmuUsage::Unused);
     device.objects = objects::objects(subdevice, &device.pdos, &device.sync_managers);
     device.services.soe.drives = objects::drives(subdevice);
+    files(config, &mut device.services.foe);
     device.dc = (subdevice.clock.is_some() || config.sync.is_some()).then(|| clock(config));
     device.behaviour = Behaviour::Terminal(InputSource::Outputs);
     device.sii_size_bytes = SII_BYTES;
     device
+}
+
+/// Files that its commands read exist, and have their name as contents; the password of a command is that of the
+/// device.
+fn files(config: &SubDeviceConfig, foe: &mut FoeDescription) {
+    for command in &config.startup {
+        match &command.action {
+            StartupAction::FileRead(read) => {
+                foe.password = read.password;
+                foe.files.push((read.name.clone(), read.name.clone().into_bytes()));
+            }
+            StartupAction::FileWrite(write) => foe.password = write.password,
+            _ => {}
+        }
+    }
 }
 
 /// Registers that a controller loads from its EEPROM get the values that the file expects. All other registers keep
@@ -190,6 +207,7 @@ fn protocols(mailbox: Option<&Mailbox>) -> MailboxProtocols {
         (!mailbox.eoe.is_empty(), MailboxProtocols::EOE),
         (mailbox.others.iter().any(|command| command.protocol == "AoE"), MailboxProtocols::AOE),
         (mailbox.others.iter().any(|command| command.protocol == "VoE"), MailboxProtocols::VOE),
+        (mailbox.others.iter().any(|command| command.protocol == "FoE"), MailboxProtocols::FOE),
     ];
     MailboxProtocols(used.into_iter().filter(|(used, _)| *used).fold(named, |all, (_, one)| all | one))
 }

@@ -129,7 +129,7 @@ fn commands_of_a_file_to_the_whole_bus_reach_each_subdevice_also_after_its_retur
 
 // covers: 6.6, 6.7, 8.2, eni-run
 #[test]
-fn reads_of_soe_and_messages_of_aoe_in_a_file_reach_the_simulated_drive() {
+fn reads_of_soe_messages_of_aoe_and_files_in_a_file_reach_the_simulated_drive() {
     let ams = "050607080301e803050607080301008004000400000000000000000034120000";
     let read = |at: &str, data: &str| {
         format!(
@@ -141,17 +141,25 @@ fn reads_of_soe_and_messages_of_aoe_in_a_file_reach_the_simulated_drive() {
     let soe = format!("<SoE><InitCmds>{both}</InitCmds></SoE>");
     let aoe =
         format!("<AoE><InitCmds><InitCmd><Transition>PS</Transition><Data>{ams}</Data></InitCmd></InitCmds></AoE>");
-    let mut plant = activate(with("", "", &(soe + &aoe), ""), false, false).expect("it fits");
+    // "gains" with the contents "12" in two packets, and "log" as it is.
+    let command = |data: &str| format!("<InitCmd><Transition>PS</Transition><Data>{data}</Data></InitCmd>");
+    let write = ["0200000000006761696e73", "03000100000031", "03000200000032"].map(command).concat();
+    let foe = format!("<FoE><InitCmds>{write}{}</InitCmds></FoE>", command("0100000000006c6f67"));
+    let mut plant = activate(with("", "", &(soe + &aoe + &foe), ""), false, false).expect("it fits");
     record(&mut plant);
     plant.settle();
     let states = |protocol| served(&plant, protocol).into_iter().map(|(state, _)| state).collect::<Vec<_>>();
     assert_eq!(states(Protocol::Soe), [AlState::PreOp, AlState::SafeOp]);
     assert_eq!(states(Protocol::Aoe), [AlState::PreOp]);
     let read = plant.events.iter().filter_map(|event| match event {
-        Event::StartupIdn { subdevice: SubDeviceId(DRIVE), comment, data, .. } => Some((comment.clone(), data.clone())),
+        Event::StartupRead { subdevice: SubDeviceId(DRIVE), comment, data, .. } => {
+            Some((comment.clone(), data.clone()))
+        }
         _ => None,
     });
-    assert_eq!(read.collect::<Vec<_>>(), [(Some("diagnosis".to_owned()), vec![0, 0])]);
+    let read: Vec<_> = read.collect();
+    assert_eq!(read, [(None, b"log".to_vec()), (Some("diagnosis".to_owned()), vec![0, 0])]);
+    assert_eq!(plant.device(DRIVE).application.files().file(b"gains"), Some(&b"12"[..]));
 }
 
 // covers: 8.2, eni-run

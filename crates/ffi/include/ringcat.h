@@ -1,0 +1,56 @@
+/*
+ * ringcat.h: what RingCAT adds to ecrt.h. Networks from a network file (docs/network-file.md of RingCAT).
+ *
+ * A program that loads a network file declares nothing itself: SubDevices with their PDOs, start-up commands and SYNC
+ * signals, and the domains, are those of the file. The other functions of ecrt.h work as ever: requests and mailbox
+ * services with the SubDevices, queue, process, state and data with the domains, clocks and the cycle with the master.
+ * The library is libethercat of RingCAT; libfakeethercat does not have these functions.
+ */
+#ifndef RINGCAT_H
+#define RINGCAT_H
+
+#include "ecrt.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A variable of the file. Its domain has the byte at ecrt_domain_data(domain) + offset. */
+typedef struct {
+    ec_domain_t *domain;
+    unsigned int offset; /* byte in the image of the domain */
+    unsigned int bit;    /* bit in this byte, 0 to 7 */
+    unsigned int bits;   /* number of bits */
+    int is_output;       /* 1: the program writes it */
+} ringcat_variable_t;
+
+/*
+ * Declares the network of a file, on a master that is requested and not active.
+ *
+ * Returns 0, or -EINVAL: the file cannot be read or is wrong, or it does not fit the bus (standard error has file, line
+ * and reason); -EBUSY: SubDevices or domains were declared before, or the master is active; -EPERM: not reserved;
+ * -EFAULT: path is NULL. If it fails nothing is declared. After ecrt_master_deactivate() nothing is declared either.
+ *
+ * Settings of its SubDevices cannot be changed by the program: the functions ecrt_slave_config_*() that do return
+ * -EBUSY. SubDevices and domains of its own can be added.
+ */
+EC_PUBLIC_API int ringcat_master_load_network(ec_master_t *master, const char *path);
+
+/* The SubDevice with a name in the file; NULL if there is none. ecrt_master_slave_config() finds it, too. */
+EC_PUBLIC_API ec_slave_config_t *ringcat_master_subdevice(ec_master_t *master, const char *name);
+
+/* The domain with a name in the file; NULL if there is none. */
+EC_PUBLIC_API ec_domain_t *ringcat_master_domain(ec_master_t *master, const char *name);
+
+/*
+ * Finds the variable with a name in the file, as in "Drive.Feedback.Statusword".
+ *
+ * Returns 0, or -ENOENT: there is none, or no domain exchanges it; -EPERM: not reserved; -EFAULT: NULL.
+ */
+EC_PUBLIC_API int ringcat_master_variable(ec_master_t *master, const char *name, ringcat_variable_t *variable);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,95 @@
+//! Networks from a network file: the functions of `ringcat.h`.
+
+use std::ffi::{c_char, c_int, c_uint};
+use std::ptr::null_mut;
+use std::sync::Arc;
+
+use super::handle::{alive, call};
+use super::memory::{put, text};
+use super::objects::{MasterObject, Owner, ec_domain_t, ec_master_t, ec_slave_config_t};
+use crate::code::{Code, Outcome};
+use crate::network;
+
+/// `ringcat_variable_t`.
+#[repr(C)]
+pub struct RingcatVariable {
+    domain: *mut ec_domain_t,
+    offset: c_uint,
+    bit: c_uint,
+    bits: c_uint,
+    is_output: c_int,
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn ringcat_master_load_network(master: *mut ec_master_t, path: *const c_char) -> c_int {
+    let load = |MasterObject(owner): &MasterObject| {
+        // SAFETY: a text or NULL (ringcat.h).
+        let path = unsafe { text(path) }?;
+        owner.master.check_reserved()?;
+        if owner.master.is_active() {
+            return Err(Code::BUSY);
+        }
+        owner.load(&network::load(&path)?)
+    };
+    // SAFETY: a handle of the library (ecrt.h).
+    unsafe { call(master, load) }
+}
+
+/// A handle by its name in the file; NULL if there is none.
+///
+/// # Safety
+/// A handle of the library, a text or NULL.
+unsafe fn named<T>(
+    master: *mut ec_master_t,
+    name: *const c_char,
+    find: impl FnOnce(&Arc<Owner>, &str) -> Outcome<*mut T>,
+) -> *mut T {
+    let found = || {
+        // SAFETY: the caller's promise.
+        let (MasterObject(owner), name) = unsafe { (alive(master)?, text(name)?) };
+        find(owner, &name)
+    };
+    found().unwrap_or(null_mut())
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn ringcat_master_subdevice(master: *mut ec_master_t, name: *const c_char) -> *mut ec_slave_config_t {
+    // SAFETY: a handle of the library, a text or NULL (ringcat.h).
+    unsafe {
+        named(master, name, |owner, name| {
+            let index = owner.master.look(|draft| draft.names().subdevices.get(name).copied())?;
+            Ok(owner.slave(index.ok_or(Code::NOT_FOUND)?))
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn ringcat_master_domain(master: *mut ec_master_t, name: *const c_char) -> *mut ec_domain_t {
+    // SAFETY: a handle of the library, a text or NULL (ringcat.h).
+    unsafe {
+        named(master, name, |owner, name| {
+            let domain = owner.master.look(|draft| draft.names().domains.get(name).copied())?;
+            owner.domain(domain.ok_or(Code::NOT_FOUND)?)
+        })
+    }
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn ringcat_master_variable(
+    master: *mut ec_master_t,
+    name: *const c_char,
+    variable: *mut RingcatVariable,
+) -> c_int {
+    let find = |MasterObject(owner): &MasterObject| -> Outcome {
+        // SAFETY: a text or NULL (ringcat.h).
+        let name = unsafe { text(name) }?;
+        let place = owner.master.look(|draft| draft.names().variables.get(&name).copied())?.ok_or(Code::NOT_FOUND)?;
+        let domain = owner.domain(place.domain)?;
+        let (offset, bit) = (place.bit / 8, place.bit % 8);
+        let found = RingcatVariable { domain, offset, bit, bits: place.bits, is_output: place.is_output.into() };
+        // SAFETY: memory for a variable, or NULL (ringcat.h).
+        unsafe { put(variable, found) }
+    };
+    // SAFETY: a handle of the library (ecrt.h).
+    unsafe { call(master, find) }
+}
