@@ -17,6 +17,8 @@ use crate::thread::ThreadArguments;
 
 /// Object with the version of the firmware (protocol 6.3, ETG.1000.6).
 const FIRMWARE: u16 = 0x100A;
+/// Object with the idents of the modules that a device has detected (protocol ES-69).
+const MODULES: u16 = 0xF050;
 
 /// Where the network is.
 #[derive(Args, Clone, Debug)]
@@ -48,17 +50,27 @@ pub struct Bus {
     pub ring: bool,
     /// Version of the firmware of each SubDevice, where it was read.
     pub firmware: Vec<Option<String>>,
+    /// Idents of the modules in the slots of each SubDevice, where they were read.
+    pub modules: Vec<Vec<u32>>,
+}
+
+/// What is read of a SubDevice besides the scan.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Wanted {
+    /// The version of its firmware.
+    pub firmware: bool,
+    /// The modules in its slots.
+    pub modules: bool,
 }
 
 impl BusArguments {
-    /// Scans. `reads_firmware` decides of which SubDevices the version of the firmware is read; they go to PREOP and
-    /// back to INIT.
-    pub fn scan(&self, reads_firmware: impl Fn(&SubDeviceInfo) -> bool) -> Result<Bus, Failure> {
+    /// Scans. `wanted` decides what is read besides of a SubDevice, which goes to PREOP and back to INIT for it.
+    pub fn scan(&self, wanted: impl FnMut(&SubDeviceInfo) -> Wanted) -> Result<Bus, Failure> {
         if let Some(path) = &self.sim {
             let segment = load_segment(path)?;
             let links = SimulatedSegment::new(Network::from_description(segment)?);
             let ring = links.addresses().redundant.is_some();
-            return scan(links, &Options::default(), ring, reads_firmware, print);
+            return scan(links, &Options::default(), ring, wanted, print);
         }
         let interfaces = InterfaceArguments {
             links: LinkNames { main: self.main.clone().unwrap_or_default(), redundant: self.redundant.clone() },
@@ -69,7 +81,7 @@ impl BusArguments {
         let links = interfaces.open(self.thread)?;
         let mut surroundings = Surroundings::watch(&interfaces, &links);
         let _awake = self.thread.apply();
-        scan(links, &interfaces.options(), self.redundant.is_some(), reads_firmware, |event| {
+        scan(links, &interfaces.options(), self.redundant.is_some(), wanted, |event| {
             match surroundings.note(&event.event) {
                 None => print(event),
                 Some(words) => words.into_iter().for_each(warn),
@@ -89,28 +101,42 @@ fn scan<L: Links>(
     links: L,
     options: &Options,
     ring: bool,
-    reads_firmware: impl Fn(&SubDeviceInfo) -> bool,
+    mut wanted: impl FnMut(&SubDeviceInfo) -> Wanted,
     on_event: impl FnMut(&ringcat::TimedEvent),
 ) -> Result<Bus, Failure> {
     let mut main_device = MainDevice::request(links, options);
     let scan = main_device.scan_with(on_event)?;
-    let mut firmware = Vec::with_capacity(scan.subdevices.len());
+    let (mut firmware, mut modules) = (Vec::new(), Vec::new());
     for info in &scan.subdevices {
-        let is_wanted = info.protocols.coe() && info.mailbox.is_some() && reads_firmware(info);
-        firmware.push(if is_wanted { read_firmware(&mut main_device, info) } else { None });
+        let has_objects = info.protocols.coe() && info.mailbox.is_some();
+        let wanted = if has_objects { wanted(info) } else { Wanted::default() };
+        let (version, idents) = read_besides(&mut main_device, info, wanted);
+        firmware.push(version);
+        modules.push(idents);
     }
-    Ok(Bus { scan, ring, firmware })
+    Ok(Bus { scan, ring, firmware, modules })
 }
 
-/// The version of the firmware; a SubDevice that does not answer is reported.
-fn read_firmware<L: Links>(main_device: &mut MainDevice<L>, info: &SubDeviceInfo) -> Option<String> {
+/// Version of the firmware and idents of modules; a SubDevice that does not answer is reported. Without a list of its
+/// modules a device has none to read.
+fn read_besides<L: Links>(
+    main_device: &mut MainDevice<L>,
+    info: &SubDeviceInfo,
+    wanted: Wanted,
+) -> (Option<String>, Vec<u32>) {
+    if !wanted.firmware && !wanted.modules {
+        return (None, Vec::new());
+    }
     let position = info.position;
-    let read = main_device
-        .subdevice(position)
-        .request_state(AlState::PreOp)
-        .and_then(|()| main_device.subdevice(position).sdo_read::<String>(FIRMWARE, 0));
+    let read = main_device.subdevice(position).request_state(AlState::PreOp).map(|()| {
+        let firmware = wanted.firmware.then(|| main_device.subdevice(position).sdo_read::<String>(FIRMWARE, 0));
+        let count = wanted.modules.then(|| main_device.subdevice(position).sdo_read::<u8>(MODULES, 0).ok());
+        let slots = 1..=count.flatten().unwrap_or(0);
+        let ident = |slot| main_device.subdevice(position).sdo_read::<u32>(MODULES, slot).ok();
+        (firmware.and_then(|read| read.map_err(warn).ok()), slots.map_while(ident).collect())
+    });
     if let Err(error) = main_device.subdevice(position).request_state(AlState::Init) {
         warn(error);
     }
-    read.map_err(warn).ok()
+    read.map_err(warn).unwrap_or_default()
 }

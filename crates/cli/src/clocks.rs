@@ -21,6 +21,7 @@ use ringcat::{
 
 use crate::access::{Access, AccessArguments, WireLinks};
 use crate::clock_options::{ClockOptions, farthest};
+use crate::descriptions::EsiArgument;
 use crate::ending::EndRequest;
 use crate::failure::Failure;
 use crate::interfaces::now;
@@ -74,6 +75,8 @@ pub struct ClocksArguments {
     /// Draw the differences over time into this file
     #[arg(long, value_name = "FILE.svg", help_heading = "Output")]
     plot: Option<PathBuf>,
+    #[command(flatten)]
+    esi: EsiArgument,
 }
 
 /// Runs. It has held where all clocks locked and stayed together.
@@ -86,17 +89,18 @@ pub fn run(arguments: &ClocksArguments) -> Result<Report, Failure> {
     let access = arguments.access.begin(&arguments.access.interfaces.options())?;
     let Access { supervisor, cyclic, surroundings, recording, tenure, awake: _awake, .. } = access;
     let begin = now();
-    let scan = match tenure.scan() {
+    let mut scan = match tenure.scan() {
         Some(scan) => scan,
         None => supervisor.scan().map_err(|error| surroundings.explain(error, supervisor.counters().foreign))?,
     };
+    let objects = arguments.esi.complete(&mut scan.subdevices, &[])?;
     let names = Names(scan.subdevices.iter().map(|info| info.name.clone()).collect());
     let mut declaration = automatic(&scan.subdevices, arguments.cycle);
     arguments.options.declare(&mut declaration, &scan.subdevices)?;
     let signals: Vec<Option<SyncSignals>> = declaration.subdevices.iter().map(|config| config.sync).collect();
     let application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
     let cycles = start_cycles(arguments, application, &end)?;
-    let log = RunLog::new(begin, EventLog::new(begin, names), surroundings);
+    let log = RunLog::new(begin, EventLog::new(begin, names), surroundings).with_objects(objects);
     let mut watch = Watch { begin, log, end: &end };
     let mut course = Course::default();
     let locked = watch.until(&cycles, &mut course, now() + LOCK_LIMIT, true)?;

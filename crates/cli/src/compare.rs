@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use ringcat::config::{Configuration, FoundNetwork, Stated};
+use ringcat::config::{Configuration, FoundNetwork, ObjectNames, Stated};
 use ringcat::eni::EniFile;
 use ringcat::network::LoadedNetwork;
 
-use crate::bus::BusArguments;
+use crate::bus::{BusArguments, Wanted};
+use crate::descriptions::EsiArgument;
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::network::{Compare, Difference};
@@ -40,18 +41,42 @@ pub struct CompareArguments {
     /// The network of a network file (see docs/network-file.md)
     #[arg(long, value_name = "FILE.toml", conflicts_with = "eni", help_heading = "Segment")]
     network: Option<PathBuf>,
+    #[command(flatten)]
+    esi: EsiArgument,
+}
+
+/// What the file says.
+struct Declared {
+    configuration: Configuration,
+    stated: Vec<Stated>,
+    /// Names of objects, by SubDevice.
+    names: Vec<ObjectNames>,
 }
 
 /// Scans and prints every difference.
 pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
-    let (configuration, stated) = load(arguments)?;
+    let Declared { configuration, stated, names: declared } = load(arguments)?;
+    let mut descriptions = arguments.esi.open()?;
     let with_firmware: Vec<(u32, u32)> =
         stated.iter().filter(|it| !it.firmware.is_empty()).filter_map(|it| it.device).collect();
-    let bus =
-        arguments.bus.scan(|info| with_firmware.contains(&(info.identity.vendor_id, info.identity.product_code)))?;
+    let mut bus = arguments.bus.scan(|info| Wanted {
+        firmware: with_firmware.contains(&(info.identity.vendor_id, info.identity.product_code)),
+        modules: descriptions.as_mut().is_some_and(|it| it.has_slots(info)),
+    })?;
+    let described = match &mut descriptions {
+        Some(descriptions) => descriptions.complete(&mut bus.scan.subdevices, &bus.modules)?,
+        None => arguments.esi.complete(&mut bus.scan.subdevices, &[])?,
+    };
     let found = &bus.scan.subdevices;
     let network = FoundNetwork { subdevices: found, topology: &bus.scan.topology, firmware: &bus.firmware };
-    let differences = configuration.differences(network, &stated);
+    let mut differences = configuration.differences(network, &stated);
+    for difference in &mut differences {
+        let of_file = difference.subdevice.and_then(|at| declared.get(at.0));
+        let of_bus = difference.position.and_then(|at| described.get(usize::from(at.0)));
+        for names in of_file.into_iter().chain(of_bus) {
+            difference.text = names.annotate(&difference.text);
+        }
+    }
     for difference in &differences {
         let mark = if difference.prevents_op { '!' } else { ' ' };
         let first = format!("{mark} {:<width$}", difference.kind.word(), width = KIND - 2);
@@ -84,16 +109,28 @@ pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
     Ok(Report { verdict, data })
 }
 
-fn load(arguments: &CompareArguments) -> Result<(Configuration, Vec<Stated>), Failure> {
+fn load(arguments: &CompareArguments) -> Result<Declared, Failure> {
     if let Some(path) = &arguments.network {
         let network = LoadedNetwork::load(path).map_err(|error| Failure::new(error.to_string()))?;
         let stated = network.stated();
-        return Ok((network.configuration, stated));
+        let names = network.file.subdevice.iter().map(|subdevice| {
+            let mut names = ObjectNames::default();
+            names.add_declared(subdevice);
+            names
+        });
+        let names = names.collect();
+        return Ok(Declared { configuration: network.configuration, stated, names });
     }
     let path = arguments.eni.as_deref().ok_or_else(|| Failure::new("expected --eni FILE or --network FILE"))?;
     let file = EniFile::load(path).map_err(|error| Failure::new(error.to_string()))?;
     let stated = file.stated();
-    Ok((file.configuration, stated))
+    let names = file.eni.subdevices.iter().map(|subdevice| {
+        let mut names = ObjectNames::default();
+        names.add_eni(subdevice);
+        names
+    });
+    let names = names.collect();
+    Ok(Declared { configuration: file.configuration, stated, names })
 }
 
 /// A text in lines of at most this number of characters; longer words have lines of their own.

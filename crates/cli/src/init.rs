@@ -11,9 +11,10 @@ use clap::{Args, ValueEnum};
 use ringcat::config::network::model::{CheckRevision, Sync as SyncTable};
 use ringcat::network::{NetworkFile, ScanOptions};
 
-use crate::bus::{Bus, BusArguments};
+use crate::bus::{Bus, BusArguments, Wanted};
 use crate::clock_options::sync::{Sync, choose, sync};
 use crate::clock_options::{SYNC_HELP, SYNC_LONG_HELP};
+use crate::descriptions::{Descriptions, EsiArgument};
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::network::Init;
@@ -65,9 +66,8 @@ pub struct InitArguments {
     /// Read the versions of the firmware too, for `ringcat compare`
     #[arg(long, help_heading = "Network")]
     firmware: bool,
-    /// Folder of descriptions (ESI) for names that the devices do not have
-    #[arg(long, value_name = "DIR", help_heading = "Network")]
-    esi: Option<PathBuf>,
+    #[command(flatten)]
+    esi: EsiArgument,
     /// File to write
     #[arg(long, value_name = "FILE.toml", help_heading = "Output")]
     out: PathBuf,
@@ -103,9 +103,16 @@ pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
     if !arguments.overwrite && fs::symlink_metadata(out).is_ok() {
         return Err(Failure::new(format!("{} exists: name another file, or add --overwrite", out.display())));
     }
+    let mut descriptions = arguments.esi.open()?;
     let begin = Instant::now();
-    let bus = arguments.bus.scan(|_| arguments.firmware)?;
+    let mut bus = arguments.bus.scan(|info| Wanted {
+        firmware: arguments.firmware,
+        modules: descriptions.as_mut().is_some_and(|it| it.has_slots(info)),
+    })?;
     let scanned = Instant::now();
+    if let Some(descriptions) = &mut descriptions {
+        descriptions.name_subdevices(&mut bus.scan.subdevices);
+    }
     let mut options = ScanOptions::new(&arguments.name, arguments.cycle);
     options.ring = bus.ring;
     options.clocks = arguments.clocks || !arguments.sync.is_empty();
@@ -113,7 +120,7 @@ pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
     options.check_revision = arguments.revisions.into();
     options.check_serial = arguments.serials;
     let mut file = NetworkFile::from_scan(&bus.scan.subdevices, &bus.scan.topology, &options);
-    let named = complete(arguments, &bus, &mut file)?;
+    let named = complete(arguments, &bus, &mut file, descriptions.as_mut())?;
     let text = file.to_text();
     // What is written must be what `run` reads.
     NetworkFile::read(&out.display().to_string(), text.as_bytes()).map_err(|error| Failure::new(error.to_string()))?;
@@ -125,9 +132,7 @@ pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
     let subdevices = file.subdevice.len();
     say!("scan {:.1} ms, file {:.1} ms", scan_us as f64 / 1e3, file_us as f64 / 1e3);
     if let Some(named) = named {
-        let (described, names) =
-            (counted(named.described, "SubDevice", "SubDevices"), counted(named.names, "name", "names"));
-        say!("{described} described, {names} from descriptions");
+        say!("{named}");
     }
     say!("digest {digest}");
     let held = format!(
@@ -141,6 +146,7 @@ pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
         subdevices,
         variables,
         described: named.map(|named| named.described),
+        modules: named.map(|named| named.modules),
         named: named.map_or(0, |named| named.names),
         bytes: text.len(),
         scan_us,
@@ -151,7 +157,12 @@ pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
 }
 
 /// What a scan does not give: chosen signals, versions of the firmware, names from descriptions.
-fn complete(arguments: &InitArguments, bus: &Bus, file: &mut NetworkFile) -> Result<Option<names::Named>, Failure> {
+fn complete(
+    arguments: &InitArguments,
+    bus: &Bus,
+    file: &mut NetworkFile,
+    descriptions: Option<&mut Descriptions>,
+) -> Result<Option<names::Named>, Failure> {
     let found = &bus.scan.subdevices;
     let signals = choose(&arguments.sync, found, arguments.cycle).map_err(Failure::new)?;
     for (subdevice, signals) in file.subdevice.iter_mut().zip(signals) {
@@ -166,7 +177,7 @@ fn complete(arguments: &InitArguments, bus: &Bus, file: &mut NetworkFile) -> Res
             warn(format!("position {position} \"{name}\": its EEPROM contradicts itself: without process data"));
         }
     }
-    arguments.esi.as_deref().map(|folder| names::fill(file, found, folder)).transpose()
+    descriptions.map(|descriptions| names::fill(file, bus, descriptions)).transpose()
 }
 
 fn write(arguments: &InitArguments, text: &str) -> Result<(), Failure> {

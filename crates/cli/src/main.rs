@@ -8,6 +8,7 @@ mod clock_options;
 mod clocks;
 mod compare;
 mod demo;
+mod descriptions;
 mod doctor;
 mod ending;
 mod eni_summary;

@@ -15,6 +15,7 @@ mod options;
 mod pace;
 mod reasons;
 mod summary;
+pub mod watched;
 
 use std::ops::ControlFlow;
 use std::time::Duration;
@@ -38,7 +39,7 @@ use crate::run_log::{RunLog, name_of};
 use crate::surroundings::Surroundings;
 use crate::times::in_words;
 use crate::verdict::{Report, Verdict};
-use configured::{ConfiguredNetwork, Watched};
+use configured::ConfiguredNetwork;
 use exchange::Run;
 use jobs::Jobs;
 use live::Live;
@@ -46,6 +47,7 @@ pub use options::RunArguments;
 use pace::Seen;
 use reasons::Exchanged;
 use summary::{End, clock_account, final_account, json, summary};
+use watched::Watched;
 
 /// SubDevices have this long to get to INIT in the end.
 const STOP_LIMIT: Duration = Duration::from_secs(5);
@@ -63,13 +65,14 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
     let Access { interfaces, supervisor, mut cyclic, mut surroundings, recording, tenure, awake: _awake } = access;
     let begin = now();
     let beside = arguments.beside.start(&supervisor, &interfaces)?;
-    let scan = match tenure.scan() {
+    let mut scan = match tenure.scan() {
         Some(scan) => scan,
         None => scan(&supervisor, &mut cyclic, &mut surroundings, begin)?,
     };
-    let names = match &network {
-        Some(network) => network.names(),
-        None => Names(scan.subdevices.iter().map(|info| info.name.clone()).collect()),
+    let described = arguments.esi.complete(&mut scan.subdevices, &[])?;
+    let (names, objects) = match &network {
+        Some(network) => (network.names(), network.objects(&scan.subdevices, described)),
+        None => (Names(scan.subdevices.iter().map(|info| info.name.clone()).collect()), described),
     };
     let declaration = arguments.declared.declare(network.as_ref(), &scan.subdevices)?;
     let declaration = arguments.resend.adapt(declaration.with_under_way(arguments.under_way.under_way));
@@ -84,7 +87,8 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
     let application = activate(arguments, network.as_ref(), supervisor, declaration, cyclic)?;
     let (cycles, watched, sent_once, jobs) = start_cycles(arguments, network.as_ref(), application, &names, &end)?;
     let ring = interfaces.links.redundant.is_some();
-    let log = RunLog::new(begin, EventLog::new(begin, names).with_every_event(arguments.all_events), surroundings);
+    let events = EventLog::new(begin, names).with_every_event(arguments.all_events);
+    let log = RunLog::new(begin, events, surroundings).with_objects(objects);
     let mut run = Run { cycles, log, live: Live::new(ring, clocks), clocks, domains, beside, watched, recording };
     let reached = run.reach_op(arguments.within, &end);
     let before = Seen::of(run.cycles.cyclic_status());

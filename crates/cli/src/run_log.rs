@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use ringcat::config::ObjectNames;
 use ringcat::event_log::EventLog;
 use ringcat::text::describe;
 use ringcat::{CyclicThread, Event, Instant, Links};
@@ -31,12 +32,19 @@ pub struct RunLog {
     begin: Instant,
     events: EventLog,
     surroundings: Surroundings,
+    /// Names of the objects of each declared SubDevice.
+    objects: Vec<ObjectNames>,
 }
 
 impl RunLog {
     /// A log over this one, whose times count from `begin`.
     pub fn new(begin: Instant, events: EventLog, surroundings: Surroundings) -> RunLog {
-        RunLog { begin, events, surroundings }
+        RunLog { begin, events, surroundings, objects: Vec::new() }
+    }
+
+    /// The same with the names of the objects of each declared SubDevice.
+    pub fn with_objects(self, objects: Vec<ObjectNames>) -> RunLog {
+        RunLog { objects, ..self }
     }
 
     /// The log of events.
@@ -57,7 +65,7 @@ impl RunLog {
 
     /// Shows what has happened since the last call.
     pub fn report<L: Links + Send>(&mut self, cycles: &CyclicThread<L>, now: Instant, mut show: impl FnMut(Shown)) {
-        let RunLog { begin, events, surroundings } = self;
+        let RunLog { begin, events, surroundings, objects } = self;
         if let Some((link, source)) = cycles.cyclic_status().foreign() {
             surroundings.note_sender(link, source).map(Shown::Warning).into_iter().for_each(&mut show);
         }
@@ -67,6 +75,7 @@ impl RunLog {
                 None => {
                     let Some(line) = events.event(&event) else { continue };
                     let (time, text) = (event.at.since(*begin), describe(&event, events.names()));
+                    let [line, text] = with_objects(&event.event, objects, [line, text]);
                     show(Shown::Event { line, time, name: Some(name_of(&event.event)), text });
                 }
             }
@@ -77,6 +86,20 @@ impl RunLog {
             let text = line.strip_prefix(&before).unwrap_or(&line).to_owned();
             show(Shown::Event { line, time: now.since(*begin), name: None, text });
         }
+    }
+}
+
+/// Texts of an event with the names of the objects that it mentions.
+fn with_objects(event: &Event, objects: &[ObjectNames], texts: [String; 2]) -> [String; 2] {
+    let (Event::ConfigurationFailed { subdevice, .. }
+    | Event::PlanOddity { subdevice, .. }
+    | Event::StartupRead { subdevice, .. }) = event
+    else {
+        return texts;
+    };
+    match objects.get(subdevice.0) {
+        Some(names) => texts.map(|text| names.annotate(&text)),
+        None => texts,
     }
 }
 
@@ -96,6 +119,9 @@ fn variant(event: &impl std::fmt::Debug) -> String {
 
 #[cfg(test)]
 mod tests {
+    use ringcat::SubDeviceId;
+    use ringcat::config::network::model::{Entry, Pdo, SubDevice, SyncManager};
+
     use super::*;
 
     // covers: json
@@ -103,5 +129,25 @@ mod tests {
     fn an_event_is_named_by_its_variant() {
         assert_eq!(name_of(&Event::ScanFinished { subdevices: 3 }), "ScanFinished");
         assert_eq!(name_of(&Event::InterfacesSwapped), "InterfacesSwapped");
+    }
+
+    // covers: esi-use
+    #[test]
+    fn an_object_that_a_subdevice_refuses_is_named_with_its_name() {
+        let names = |name: &str| {
+            let entry = Entry { index: 0x6060, name: name.to_owned(), ..Entry::default() };
+            let pdo = Pdo { index: 0x1600, entries: Some(vec![entry]), ..Pdo::default() };
+            let sync_manager = SyncManager { pdo: vec![pdo], ..SyncManager::default() };
+            let mut names = ObjectNames::default();
+            names.add_declared(&SubDevice { sync_manager: vec![sync_manager], ..SubDevice::default() });
+            names
+        };
+        let objects = [names("of another"), names("Modes of operation")];
+        let text = "SubDevice 1: start-up command 0: SDO 0x6060:00 refused".to_owned();
+        let event = Event::ConfigurationFailed { subdevice: SubDeviceId(1), reason: String::new() };
+        let [line, named] = with_objects(&event, &objects, [format!("1 ms  {text}"), text.clone()]);
+        assert!(named.contains("0x6060:00 \"Modes of operation\" refused") && line.ends_with(&named), "{line}");
+        let other = Event::Lost { subdevice: SubDeviceId(1) };
+        assert_eq!(with_objects(&other, &objects, [text.clone(), text.clone()]), [text.clone(), text]);
     }
 }

@@ -1,13 +1,17 @@
 //! `ringcat scan`: the SubDevices on the wire. All of them are in INIT afterwards, unless a daemon has them.
 
+mod pdos;
+
 use clap::Args;
 use ringcat::text::{Names, describe};
-use ringcat::{Event, MainDevice};
+use ringcat::{Event, MainDevice, Scan};
 
 use crate::access::{Access, AccessArguments};
+use crate::descriptions::EsiArgument;
 use crate::ending::EndRequest;
 use crate::failure::Failure;
 use crate::json::data::Data;
+use crate::json::scan;
 use crate::output::{counted, say, warn};
 use crate::surroundings::Surroundings;
 use crate::table;
@@ -27,13 +31,20 @@ output, the table or JSON to the standard output.";
 pub struct ScanArguments {
     #[command(flatten)]
     access: AccessArguments,
+    /// List the PDOs of each SubDevice with their entries, as far as they are known
+    ///
+    /// From its EEPROM; a daemon also knows those of a dictionary that it has read.
+    #[arg(long, help_heading = "Output")]
+    pdos: bool,
+    #[command(flatten)]
+    esi: EsiArgument,
 }
 
 /// Scans and prints what was found; what happens meanwhile goes to the standard error output.
 pub fn run(arguments: &ScanArguments) -> Result<Report, Failure> {
     EndRequest::at_once()?;
     if arguments.access.master.is_some() {
-        return known(&arguments.access);
+        return known(arguments);
     }
     let AccessArguments { interfaces, thread, recording, .. } = &arguments.access;
     let links = interfaces.open(*thread)?;
@@ -54,26 +65,40 @@ pub fn run(arguments: &ScanArguments) -> Result<Report, Failure> {
     if foreign > 0 {
         eprintln!("{foreign} frames of another MainDevice arrived during the scan: {}", surroundings.senders());
     }
+    drop(main_device);
+    let data = show(arguments, scan)?;
+    let verdict = Verdict::Held(counted(data.subdevices.len(), "SubDevice", "SubDevices")).and(recording.finish());
+    Ok(Report { verdict, data: Data::Scan(data) })
+}
+
+/// Prints what was found, with the names of descriptions.
+fn show(arguments: &ScanArguments, mut scan: Scan) -> Result<scan::Scan, Failure> {
+    let objects = arguments.esi.complete(&mut scan.subdevices, &[])?;
+    let mut json = table::json(&scan);
     for line in table::lines(&scan) {
         say!("{line}");
     }
-    drop(main_device);
-    let verdict = Verdict::Held(counted(scan.subdevices.len(), "SubDevice", "SubDevices")).and(recording.finish());
-    Ok(Report { verdict, data: Data::Scan(table::json(&scan)) })
+    if arguments.pdos {
+        for ((info, names), json) in scan.subdevices.iter().zip(&objects).zip(&mut json.subdevices) {
+            let pdos = pdos::json(info, names);
+            pdos::lines(info, &pdos).iter().for_each(|line| say!("{line}"));
+            json.pdos = Some(pdos);
+        }
+    }
+    Ok(json)
 }
 
 /// What a daemon knows of the bus of a master. Nothing is scanned: a daemon does that after each change.
-fn known(access: &AccessArguments) -> Result<Report, Failure> {
+fn known(arguments: &ScanArguments) -> Result<Report, Failure> {
+    let access = &arguments.access;
     let Access { supervisor, cyclic, recording, tenure, .. } = access.begin(&access.interfaces.options())?;
     let scan = match tenure.scan() {
         Some(scan) => scan,
         None => supervisor.scan()?,
     };
-    for line in table::lines(&scan) {
-        say!("{line}");
-    }
     drop(cyclic);
-    let verdict = Verdict::Held(counted(scan.subdevices.len(), "SubDevice", "SubDevices"));
+    let data = show(arguments, scan)?;
+    let verdict = Verdict::Held(counted(data.subdevices.len(), "SubDevice", "SubDevices"));
     let verdict = verdict.and(tenure.end()).and(recording.finish());
-    Ok(Report { verdict, data: Data::Scan(table::json(&scan)) })
+    Ok(Report { verdict, data: Data::Scan(data) })
 }

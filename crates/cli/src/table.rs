@@ -68,6 +68,7 @@ pub fn json_subdevices(scan: &Scan) -> Vec<scan::SubDevice> {
             output_bytes: bytes.map(|both| both[0]),
             input_bytes: bytes.map(|both| both[1]),
             connected_to: connection.map(|c| Port { position: usize::from(c.near.position().0), port: c.near.port() }),
+            pdos: None,
         }
     };
     scan.subdevices.iter().map(subdevice).collect()

@@ -31,6 +31,17 @@ impl Configuration {
         self.subdevices.iter().map(name).collect()
     }
 
+    /// The index of the found SubDevice that each declared one is, `None` where it is missing.
+    pub fn places(&self, found: &[SubDeviceInfo]) -> Vec<Option<usize>> {
+        let mut places = vec![None; self.declaration.subdevices.len()];
+        for resolution in resolve(&self.declaration.subdevices, found) {
+            if let Resolution::Found { config, info } = resolution {
+                places[config] = Some(info);
+            }
+        }
+        places
+    }
+
     /// Compares the SubDevices of a scan with the file as an activation does. Returns each SubDevice that is missing,
     /// has another identity, or is not in the file.
     pub fn compare(&self, found: &[SubDeviceInfo]) -> Vec<Difference> {

@@ -6,6 +6,7 @@
 //! beyond their range, two devices of one identity, data with half a byte.
 
 mod choices;
+mod detected;
 mod element;
 mod error;
 pub mod index;
@@ -23,6 +24,7 @@ pub mod sii;
 mod values;
 
 pub use choices::{Choices, EntryChoice, MappingChoice, Parameter, PdoChoice, SamplesChoice};
+pub use detected::detected_modules;
 pub use error::{EsiError, EsiProblem, Notice};
 pub use limits::{MAX_ATTRIBUTE_BYTES, MAX_DEVICES, MAX_ELEMENTS, MAX_REFERENCES, MAX_TEXT_BYTES};
 pub use model::{

@@ -16,9 +16,11 @@ mod follow;
 mod ip;
 #[cfg(feature = "network")]
 pub mod network;
+mod object_names;
 mod xml;
 
 pub use compare::{Difference, DifferenceKind, FoundNetwork, Stated};
 pub use configuration::{Configuration, ImageArea, ImageCopy, Notice, ProcessImage, SubDeviceFacts, Variable};
 pub use export::{Export, ExportDetails, ExportError, ExportOptions, LeftOut, LrwUse, SubDeviceDetails, export};
 pub use follow::follow;
+pub use object_names::ObjectNames;

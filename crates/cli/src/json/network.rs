@@ -12,6 +12,8 @@ pub struct Init {
     pub variables: usize,
     /// SubDevices that a description describes; null without descriptions
     pub described: Option<usize>,
+    /// Modules in slots of SubDevices that a description describes; null without descriptions
+    pub modules: Option<usize>,
     /// Names of PDOs and entries that come from descriptions
     pub named: usize,
     /// Bytes of the file
@@ -51,6 +53,7 @@ pub struct Difference {
     pub position: Option<u16>,
     /// The network cannot reach OP with this difference
     pub prevents_op: bool,
-    /// The difference in words
+    /// The difference in words, with the names of PDOs, entries and objects that the file, the SubDevice or its
+    /// description (`--esi`) gives
     pub text: String,
 }

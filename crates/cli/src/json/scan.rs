@@ -26,7 +26,7 @@ pub struct SubDevice {
     pub station: u16,
     /// Station alias of its EEPROM; 0: none
     pub alias: u16,
-    /// Name of its EEPROM
+    /// Name of its EEPROM, else of its description (`--esi`)
     pub name: String,
     /// Vendor ID
     pub vendor_id: u32,
@@ -42,4 +42,38 @@ pub struct SubDevice {
     pub input_bytes: Option<u32>,
     /// The port on the way to the main interface that its entry port is connected to; null at an interface
     pub connected_to: Option<Port>,
+    /// Its PDOs with `--pdos`; null without it
+    pub pdos: Option<Vec<Pdo>>,
+}
+
+/// A PDO.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Pdo {
+    /// Index of its mapping object
+    pub index: u16,
+    /// outputs or inputs
+    pub direction: &'static str,
+    /// SyncManager to which it is assigned; null without one
+    pub sync_manager: Option<u8>,
+    /// Its name; empty without one
+    pub name: String,
+    /// Its entries in order
+    pub entries: Vec<PdoEntry>,
+}
+
+/// An entry of a PDO.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct PdoEntry {
+    /// Index of its object; 0 for a gap
+    pub index: u16,
+    /// Subindex of its object
+    pub sub_index: u8,
+    /// Length in bits
+    pub bits: u8,
+    /// Type of CoE; empty where it is not known
+    pub data_type: String,
+    /// Its name; empty without one
+    pub name: String,
 }

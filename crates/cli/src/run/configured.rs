@@ -2,26 +2,22 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
 
 use clap::Args;
 use ringcat::Directory;
-use ringcat::config::{Configuration, Variable};
-use ringcat::eni::{EniFile, EniImage, EniVariable, Value, VariableType};
+use ringcat::config::{Configuration, ObjectNames, Variable};
+use ringcat::eni::{EniFile, EniImage, EniVariable, VariableType};
 use ringcat::network::{LoadedNetwork, NetworkFile};
 use ringcat::text::Names;
 use ringcat::{
-    ActivateError, Declaration, Direction, Error, Instant, JunctionConnection, JunctionMode, ProcessData, Scan,
-    StationAddress, SubDeviceId, SubDeviceInfo,
+    ActivateError, Declaration, Direction, Error, JunctionConnection, JunctionMode, Scan, StationAddress, SubDeviceId,
+    SubDeviceInfo,
 };
 
+use super::watched::{Watched, Work, work};
 use crate::failure::Failure;
-use crate::json::run;
 use crate::output::{say, warn};
 
-/// Shortest time between two printed values of a variable.
-const PRINT_PERIOD: Duration = Duration::from_secs(1);
 /// Similar names in an error: at most this number, at least this alike (1 is equal).
 const NEAR: usize = 3;
 const LIKE: f64 = 0.6;
@@ -156,6 +152,26 @@ impl ConfiguredNetwork {
         Names(self.configuration().names())
     }
 
+    /// Names of the objects of each SubDevice: those of the file, then those of the scan.
+    pub fn objects(&self, found: &[SubDeviceInfo], described: Vec<ObjectNames>) -> Vec<ObjectNames> {
+        let described: Vec<Arc<ObjectNames>> = described.into_iter().map(Arc::new).collect();
+        let places = self.configuration().places(found).into_iter().enumerate();
+        let of = |(at, place): (usize, Option<usize>)| {
+            let mut names = ObjectNames::default();
+            match &self.file {
+                FileOfNetwork::Eni { file, .. } => {
+                    file.eni.subdevices.get(at).into_iter().for_each(|it| names.add_eni(it))
+                }
+                FileOfNetwork::Network(network) => {
+                    network.file.subdevice.get(at).into_iter().for_each(|it| names.add_declared(it));
+                }
+            }
+            place.and_then(|place| described.get(place)).into_iter().for_each(|found| names.share(found.clone()));
+            names
+        };
+        places.map(of).collect()
+    }
+
     /// Whether the file declares the process data of every SubDevice with all registers.
     pub fn is_complete(&self) -> bool {
         self.configuration().declaration.subdevices.iter().all(|config| config.declared.is_some())
@@ -287,10 +303,7 @@ impl ConfiguredNetwork {
             Ok(image.variables()[number].clone())
         });
         let watched: Vec<EniVariable> = watched.collect::<Result<_, Failure>>()?;
-        let values: Arc<[AtomicU64]> = watched.iter().map(|_| AtomicU64::new(0)).collect();
-        let work = Work { image, watched: watched.clone(), values: values.clone() };
-        let printed = vec![None; watched.len()];
-        Ok((work, Watched { watched, values, printed, next: Instant(0) }))
+        Ok(work(image, watched))
     }
 }
 
@@ -308,88 +321,10 @@ fn near<'a>(wanted: &str, names: impl Iterator<Item = &'a str>) -> Vec<String> {
     near.into_iter().take(NEAR).map(|(_, name)| format!("\"{name}\"")).collect()
 }
 
-/// The work of each cycle; it neither allocates nor waits.
-#[derive(Debug)]
-pub struct Work {
-    image: EniImage,
-    watched: Vec<EniVariable>,
-    values: Arc<[AtomicU64]>,
-}
-
-impl Work {
-    /// One cycle.
-    pub fn cycle(&mut self, data: &mut ProcessData<'_>) {
-        self.image.take_inputs(data);
-        for (variable, value) in self.watched.iter().zip(self.values.iter()) {
-            value.store(self.image.read(variable), Ordering::Relaxed);
-        }
-        self.image.give_outputs(data);
-    }
-
-    /// Inputs that the file copies to outputs.
-    pub fn copies(&self) -> &[ringcat::CopyRule] {
-        self.image.copies()
-    }
-}
-
-/// Variables that are printed.
-#[derive(Debug, Default)]
-pub struct Watched {
-    watched: Vec<EniVariable>,
-    values: Arc<[AtomicU64]>,
-    printed: Vec<Option<u64>>,
-    next: Instant,
-}
-
-impl Watched {
-    /// Lines for variables that have changed since the last call, at most once a second.
-    pub fn changes(&mut self, now: Instant) -> Vec<String> {
-        if now < self.next || self.watched.is_empty() {
-            return Vec::new();
-        }
-        self.next = now + PRINT_PERIOD;
-        let mut lines = Vec::new();
-        for ((variable, value), printed) in self.watched.iter().zip(self.values.iter()).zip(&mut self.printed) {
-            let value = value.load(Ordering::Relaxed);
-            if printed.replace(value) != Some(value) {
-                lines.push(line(variable, value));
-            }
-        }
-        lines
-    }
-
-    /// The last values as keys of JSON.
-    pub fn json(&self) -> Vec<run::Variable> {
-        let json = |(variable, value): (&EniVariable, &AtomicU64)| run::Variable {
-            name: variable.name.clone(),
-            value: shown(variable, value.load(Ordering::Relaxed)),
-        };
-        self.watched.iter().zip(self.values.iter()).map(json).collect()
-    }
-
-    /// Prints the last values.
-    pub fn account(&self) {
-        for (variable, value) in self.watched.iter().zip(self.values.iter()) {
-            say!("  {}", line(variable, value.load(Ordering::Relaxed)));
-        }
-    }
-}
-
-fn line(variable: &EniVariable, value: u64) -> String {
-    format!("{} = {}", variable.name, shown(variable, value))
-}
-
-/// A value as its type writes it.
-fn shown(variable: &EniVariable, value: u64) -> String {
-    let bits = u16::try_from(variable.bits.min(64)).unwrap_or(64);
-    let value: Value = variable.data_type.value(value, bits);
-    value.to_string()
-}
-
 #[cfg(test)]
 mod tests {
     use ringcat::simulated::SimulatedSegment;
-    use ringcat::{MainDevice, Options};
+    use ringcat::{Instant, MainDevice, Options};
 
     use super::*;
 
@@ -467,6 +402,22 @@ mod tests {
         assert_eq!((same.configuration().image.variables[number].direction, bits), (Direction::Outputs, 1));
         let (_, watched) = same.variable("--watch", "Buttons.Channel 1", Direction::Inputs).unwrap();
         assert_eq!(watched.direction, Direction::Inputs);
+    }
+
+    // covers: esi-use
+    #[test]
+    fn objects_have_the_names_of_the_file_then_those_of_the_scan() {
+        let segment = SimulatedSegment::new(EniFile::from_bytes(MACHINE).unwrap().simulated(false).unwrap());
+        let mut main_device = MainDevice::request(segment, &Options::default());
+        let found = main_device.scan().unwrap().subdevices;
+        let network = network(&[], &[]);
+        let declared = network.configuration().declaration.subdevices.len();
+        let described = found.iter().map(|_| ObjectNames::default()).collect();
+        let objects = network.objects(&found, described);
+        assert_eq!(objects.len(), declared);
+        let drive = network.names().0.iter().position(|name| name.starts_with("Drive")).unwrap();
+        assert_eq!(objects[drive].entry(0x6064, 0), Some("Position"), "{:?}", objects[drive]);
+        assert_eq!(network.objects(&[], Vec::new()).len(), declared, "nothing was found");
     }
 
     // covers: CR-16

@@ -6,9 +6,9 @@ use std::time::Duration;
 use ringcat::{AlState, CyclicThread, DomainId, DomainState, Instant, SubDeviceState};
 
 use super::beside::Beside;
-use super::configured::Watched;
 use super::live::{self, Live};
 use super::pace::Seen;
+use super::watched::Watched;
 use crate::access::WireLinks;
 use crate::ending::EndRequest;
 use crate::interfaces::now;

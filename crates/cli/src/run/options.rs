@@ -8,6 +8,7 @@ use super::beside::BesideArguments;
 use super::declared::DeclarationArguments;
 use super::junction::{self, Junctions, junctions};
 use crate::access::AccessArguments;
+use crate::descriptions::EsiArgument;
 use crate::resend::ResendArgument;
 use crate::times::time;
 use crate::under_way::UnderWayArgument;
@@ -86,4 +87,6 @@ pub struct RunArguments {
     /// Without it, frequent events of one kind are counted after the first twenty.
     #[arg(long, help_heading = "Output")]
     pub all_events: bool,
+    #[command(flatten)]
+    pub esi: EsiArgument,
 }

@@ -11,8 +11,9 @@ use ringcat::{CyclicThread, Declaration, ProcessData, Scan, SupervisorThread, Tr
 
 use super::beating::{Beats, HalfLinks};
 use crate::failure::Failure;
-use crate::run::configured::{ConfiguredNetwork, Watched, Work};
+use crate::run::configured::ConfiguredNetwork;
 use crate::run::declared::DeclarationArguments;
+use crate::run::watched::{Watched, Work};
 use crate::thread::ThreadArguments;
 
 /// What joins.

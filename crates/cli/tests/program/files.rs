@@ -148,6 +148,103 @@ fn names_that_a_device_does_not_have_come_from_its_description() {
     assert!(gone.code == Some(2) && gone.verdict().contains("no-such"), "{}", gone.all());
 }
 
+/// The descriptions as those of a bus, and changed by a function for the EEPROMs of its devices.
+fn with_bare_devices(place: &Place, devices: &str, bare: impl Fn(&str) -> String) -> String {
+    fs::create_dir(place.path("modules")).expect("it is ours");
+    let text = fs::read_to_string(format!("{ACME}/acme.xml")).expect("it is ours");
+    place.write("bare.xml", &bare(&text));
+    let modules = fs::read_to_string(format!("{ACME}/modules/acme-modules.xml")).expect("it is ours");
+    place.write("modules/acme-modules.xml", &bare(&modules));
+    place.write("bus.toml", devices)
+}
+
+/// Removes the names of all PDOs and of their entries.
+fn without_names(text: &str) -> String {
+    let mut out = String::new();
+    let mut rest = text;
+    while let Some(at) = ["<RxPdo", "<TxPdo"].iter().filter_map(|begin| rest.find(begin)).min() {
+        let (head, tail) = rest.split_at(at);
+        let end = tail.find("Pdo>").expect("it ends");
+        let (mut pdo, behind) = tail.split_at(end);
+        out += head;
+        while let Some((before, named)) = pdo.split_once("<Name") {
+            out += before;
+            pdo = named.split_once("</Name>").expect("it ends").1;
+        }
+        out += pdo;
+        rest = behind;
+    }
+    out + rest
+}
+
+// covers: network-file, esi-use, ES-64, ES-69
+#[test]
+fn pdos_of_modules_get_their_names_by_detected_idents_or_by_their_entries() {
+    let place = Place::new("modules");
+    let devices = "[[device]]\nesi = \"bare.xml\"\ntype = \"AM01\"\nmodules = [\"csp axis\", \"-\", \"status axis\"]\n";
+    let out = place.path("machine.toml");
+    let acme = format!("{ACME}/acme.xml");
+    for list in [true, false] {
+        let _ = fs::remove_dir_all(place.path("modules"));
+        let bus = with_bare_devices(&place, devices, |text| {
+            let text = without_names(text);
+            if list { text } else { text.replace(" DownloadModuleIdentList=\"1\"", "") }
+        });
+        let init = ringcat(&["init", "--sim", &bus, "--out", &out, "--overwrite", "--esi", &acme]);
+        assert_eq!(init.code, Some(0), "{}", init.all());
+        assert!(init.out.contains("1 SubDevice with 2 modules described, "), "{}", init.all());
+        let made = place.read("machine.toml");
+        for part in [
+            "index = 0x1600\nname = \"csp axis/Outputs\"",
+            "index = 0x1a20\nname = \"status axis/Inputs\"",
+            "{ index = 0x607a, bits = 32, name = \"Target position\", type = \"DINT\" }",
+            "{ index = 0x7041, bits = 16, name = \"Statusword\", type = \"UINT\" }",
+        ] {
+            assert!(made.contains(part), "{list}, {part}: {made}");
+        }
+    }
+}
+
+// covers: network-file, esi-use
+#[test]
+fn differences_name_pdos_and_entries_by_the_file_else_by_the_description() {
+    let place = Place::new("compared");
+    let devices = "[[device]]\nesi = \"bare.xml\"\ntype = \"AA02\"\n";
+    let bus = with_bare_devices(&place, devices, |text| {
+        without_names(text).replace("<Name>AA02 2Ch. Analog Input</Name>", "<Name></Name>")
+    });
+    let out = place.path("machine.toml");
+    let init = ringcat(&["init", "--sim", &bus, "--out", &out]);
+    assert_eq!(init.code, Some(0), "{}", init.all());
+    let text = place.read("machine.toml");
+    let changed = text.replacen("index = 0x6000, sub = 17, bits = 16", "index = 0x6000, sub = 18, bits = 16", 1);
+    let changed =
+        changed.replacen("index = 0x6000, sub = 1, bits = 1", "index = 0x6000, sub = 1, bits = 1, name = \"Low\"", 1);
+    assert_ne!(changed, text);
+    let expected = place.write("expected.toml", &changed);
+    let compare = |more: &[&str]| ringcat(&[&["compare", "--sim", &bus, "--network", &expected], more].concat());
+    let folded = |said: &Said| said.out.split_whitespace().collect::<Vec<_>>().join(" ");
+    let without = compare(&[]);
+    let bare = "PDO 0x1a00, entry 3: expected 0x6000:12 of 16 bits, got 0x6000:11 of 16 bits";
+    assert!(without.code == Some(1) && folded(&without).contains(bare), "{}", without.all());
+    let acme = format!("{ACME}/acme.xml");
+    let with = compare(&["--esi", &acme]);
+    let named = "PDO 0x1a00 \"AI Standard Channel 1\", entry 3: expected 0x6000:12 \"AI Inputs Ch.1\" of 16 bits, got \
+                 0x6000:11 \"Value\" of 16 bits";
+    assert!(with.code == Some(1) && folded(&with).contains(named), "{}", with.all());
+    assert!(with.out.lines().all(|line| line.chars().count() <= 80), "{}", with.all());
+    let of_file = place.write("named.toml", &changed.replacen("index = 0x1a00", "index = 0x1a00\nname = \"Ch 1\"", 1));
+    let by_file = ringcat(&["compare", "--sim", &bus, "--network", &of_file, "--esi", &acme]);
+    assert!(folded(&by_file).contains("PDO 0x1a00 \"Ch 1\", entry 3: expected"), "{}", by_file.all());
+    let json = compare(&["--esi", &acme, "--json"]);
+    assert!(json.out.contains("AI Standard Channel 1") && json.code == Some(1), "{}", json.all());
+    let gone = compare(&["--esi", &place.path("no-such")]);
+    assert!(gone.code == Some(2) && gone.verdict().contains("no-such: cannot be read"), "{}", gone.all());
+    let refused = place.write("broken.xml", "<EtherCATInfo>");
+    let refused = compare(&["--esi", &refused]);
+    assert!(refused.code == Some(2) && refused.verdict().contains("broken.xml"), "{}", refused.all());
+}
+
 // covers: esi-read, ES-29
 #[test]
 fn a_folder_of_descriptions_is_listed_and_searched() {

@@ -1,7 +1,7 @@
 //! Modules in the slots of a device, and the indices of what they add (protocol ES-64 to ES-71).
 
 use super::error::EsiError;
-use super::model::{CoeCommand, Device, Esi, Module, Object, Pdo, Slot, SlotDistances, SlotIndex};
+use super::model::{CoeCommand, Device, Esi, Module, Object, Pdo, Slot, SlotDistances, SlotIndex, Slots};
 use crate::xml::shown;
 
 /// Slots of a device, at most: subindices of 0xF030.
@@ -36,9 +36,7 @@ pub fn place_modules<'a>(
             false => Err(rule(device.line, "it has no slots for modules".to_owned())),
         };
     };
-    let most = slots.most.map_or(MAX_SLOTS, usize::from).min(MAX_SLOTS);
-    let definitions: Vec<(&Slot, u16)> =
-        slots.slots.iter().flat_map(|slot| (0..slot.most).map(move |instance| (slot, instance))).take(most).collect();
+    let definitions: Vec<(&Slot, u16)> = definitions(slots).collect();
     if choices.len() > definitions.len() {
         let reason = format!("{} modules for {} slots", choices.len(), definitions.len());
         return Err(rule(slots.line, reason));
@@ -54,19 +52,19 @@ pub fn place_modules<'a>(
                 None => preset(esi, slot),
             };
         if let Some(module) = module {
-            let distances = SlotDistances {
-                pdo: slot.distances.pdo.or(slots.distances.pdo),
-                object: slot.distances.object.or(slots.distances.object),
-                group_pdo: slot.distances.group_pdo.or(slots.distances.group_pdo),
-                group_object: slot.distances.group_object.or(slots.distances.group_object),
-            };
-            placed.push(PlacedModule { slot: number as u16, definition: slot, module, distances });
+            placed.push(PlacedModule::new(slots, number as u16, slot, module));
         } else if instance < slot.least {
             let reason = format!("slot {number} \"{}\" has to be filled: {}", slot.name.english(), allowed(esi, slot));
             return Err(rule(slot.line, reason));
         }
     }
     Ok(placed)
+}
+
+/// The slots of a device by number, each with its instance of the definition.
+pub(super) fn definitions(slots: &Slots) -> impl Iterator<Item = (&Slot, u16)> {
+    let most = slots.most.map_or(MAX_SLOTS, usize::from).min(MAX_SLOTS);
+    slots.slots.iter().flat_map(|slot| (0..slot.most).map(move |instance| (slot, instance))).take(most)
 }
 
 /// The module that is the preset of a slot; the only one of a slot that has to be filled counts as one.
@@ -77,7 +75,7 @@ fn preset<'a>(esi: &'a Esi, slot: &Slot) -> Option<&'a Module> {
     esi.modules.iter().find(|module| module.ident == ident)
 }
 
-fn fits(esi: &Esi, slot: &Slot, module: &Module) -> bool {
+pub(super) fn fits(esi: &Esi, slot: &Slot, module: &Module) -> bool {
     let by_class = |class: &super::model::ModuleClass| {
         module.class.as_deref() == Some(class.class.as_str())
             && class.vendor_id.unwrap_or(esi.vendor.id) == module.vendor_id
@@ -117,7 +115,18 @@ fn allowed(esi: &Esi, slot: &Slot) -> String {
     }
 }
 
-impl PlacedModule<'_> {
+impl<'a> PlacedModule<'a> {
+    pub(super) fn new(slots: &Slots, slot: u16, definition: &'a Slot, module: &'a Module) -> PlacedModule<'a> {
+        let (own, all) = (definition.distances, slots.distances);
+        let distances = SlotDistances {
+            pdo: own.pdo.or(all.pdo),
+            object: own.object.or(all.object),
+            group_pdo: own.group_pdo.or(all.group_pdo),
+            group_object: own.group_object.or(all.group_object),
+        };
+        PlacedModule { slot, definition, module, distances }
+    }
+
     /// An index of the module in its slot; `None` above 0xFFFF.
     pub fn index(&self, of: SlotIndex) -> Option<u16> {
         let is_pdo = matches!(of.index, 0x1600..=0x17FF | 0x1A00..=0x1BFF);
@@ -160,6 +169,12 @@ impl PlacedModule<'_> {
             Ok(pdo)
         };
         pdos.iter().map(shifted).collect()
+    }
+
+    /// The name of one of its PDOs in a list of all PDOs of the device: that of the module in front of its own.
+    pub fn pdo_name(&self, pdo: &Pdo, language: u32) -> String {
+        let (module, own) = (self.module.kind.trim(), pdo.name.in_language(language).trim());
+        if own.is_empty() { module.to_owned() } else { format!("{module}/{own}") }
     }
 
     /// Start-up commands as they are in this slot.

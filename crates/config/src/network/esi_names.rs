@@ -4,23 +4,40 @@
 use super::from_esi::printable;
 use super::model::{Entry, SubDevice};
 use crate::esi::sii::name_of;
-use crate::esi::{self, Device, parts};
+use crate::esi::{self, Device, Dictionary, Object, PlacedModule, parts};
 
 impl SubDevice {
     /// Fills in the names and types of PDOs and entries that it does not have, in `language`, an LcId: those of the PDO
-    /// in the description, else those of the object in its dictionary. Returns how many names were filled in.
-    pub fn name_from_esi(&mut self, device: &Device, language: u32) -> usize {
+    /// in the description or in a module, else those of the object in its dictionary. `modules` are those in the slots
+    /// of the device ([`esi::detected_modules`]). Returns how many names were filled in.
+    pub fn name_from_esi(&mut self, device: &Device, modules: &[PlacedModule<'_>], language: u32) -> usize {
+        let of_modules: Vec<(esi::Pdo, String)> = modules.iter().flat_map(|placed| pdos_of(placed, language)).collect();
         let mut named = 0;
         for pdo in self.sync_manager.iter_mut().flat_map(|sm| &mut sm.pdo) {
-            let described = device.rx_pdos.iter().chain(&device.tx_pdos).find(|it| it.index.index == pdo.index);
-            let name = described.map(|described| described.name.in_language(language));
+            let of_module = of_modules.iter().find(|(it, _)| it.index.index == pdo.index);
+            let of_device = device.rx_pdos.iter().chain(&device.tx_pdos).find(|it| it.index.index == pdo.index);
+            let (described, name) = match of_module {
+                Some((described, name)) => (Some(described), Some(name.as_str())),
+                None => (of_device, of_device.map(|described| described.name.in_language(language))),
+            };
             named += usize::from(fill(&mut pdo.name, name));
             for entry in pdo.entries.iter_mut().flatten().filter(|entry| entry.index != 0) {
-                named += usize::from(of_entry(entry, described, device, language));
+                named += usize::from(of_entry(entry, described, (device, modules), language));
             }
         }
         named
     }
+}
+
+/// The PDOs of a module in its slot, with their names.
+fn pdos_of(placed: &PlacedModule<'_>, language: u32) -> Vec<(esi::Pdo, String)> {
+    let pdos = [&placed.module.rx_pdos, &placed.module.tx_pdos].into_iter();
+    let shifted = pdos.flat_map(|pdos| placed.pdos(pdos).unwrap_or_default());
+    let named = |pdo: esi::Pdo| {
+        let name = placed.pdo_name(&pdo, language);
+        (pdo, name)
+    };
+    shifted.map(named).collect()
 }
 
 /// Sets a text that is empty; whether it is one now.
@@ -32,7 +49,12 @@ fn fill(text: &mut String, name: Option<&str>) -> bool {
     !text.is_empty()
 }
 
-fn of_entry(entry: &mut Entry, pdo: Option<&esi::Pdo>, device: &Device, language: u32) -> bool {
+fn of_entry(
+    entry: &mut Entry,
+    pdo: Option<&esi::Pdo>,
+    (device, modules): (&Device, &[PlacedModule<'_>]),
+    language: u32,
+) -> bool {
     let same = |it: &&esi::PdoEntry| {
         (it.index.index, it.sub_index, it.bit_length) == (entry.index, entry.sub, u16::from(entry.bits))
     };
@@ -42,21 +64,34 @@ fn of_entry(entry: &mut Entry, pdo: Option<&esi::Pdo>, device: &Device, language
     if !entry.name.is_empty() && !entry.data_type.is_empty() {
         return is_named;
     }
-    if let Some((name, data_type)) = of_object(device, entry, language) {
+    if let Some((name, data_type)) = of_object(device, modules, entry, language) {
         is_named |= fill(&mut entry.name, Some(&name));
         fill(&mut entry.data_type, Some(&data_type));
     }
     is_named
 }
 
-/// Name and type of the object that an entry maps, if it has as many bits.
-fn of_object(device: &Device, entry: &Entry, language: u32) -> Option<(String, String)> {
+/// Name and type of the object that an entry maps, if it has as many bits: of the device, else of a module.
+fn of_object(device: &Device, modules: &[PlacedModule<'_>], entry: &Entry, language: u32) -> Option<(String, String)> {
     let mut dictionaries = device.profiles.iter().filter_map(|profile| profile.dictionary.as_ref());
-    dictionaries.find_map(|dictionary| {
+    let of_device = dictionaries.find_map(|dictionary| {
         let object = dictionary.objects.iter().find(|object| object.index.index == entry.index)?;
-        let parts = parts(dictionary, object);
-        let part = parts.iter().find(|part| part.sub_index == entry.sub && part.bit_size == u32::from(entry.bits))?;
-        let name = if parts.len() == 1 { object.name.in_language(language) } else { &part.name };
-        Some((name.to_owned(), name_of(part.data_type)))
+        of_part(dictionary, object, entry, language)
+    });
+    of_device.or_else(|| {
+        modules.iter().find_map(|placed| {
+            let mut dictionaries = placed.module.profiles.iter().filter_map(|profile| profile.dictionary.as_ref());
+            dictionaries.find_map(|dictionary| {
+                let is_it = |object: &&Object| placed.index(object.index) == Some(entry.index);
+                of_part(dictionary, dictionary.objects.iter().find(is_it)?, entry, language)
+            })
+        })
     })
+}
+
+fn of_part(dictionary: &Dictionary, object: &Object, entry: &Entry, language: u32) -> Option<(String, String)> {
+    let parts = parts(dictionary, object);
+    let part = parts.iter().find(|part| part.sub_index == entry.sub && part.bit_size == u32::from(entry.bits))?;
+    let name = if parts.len() == 1 { object.name.in_language(language) } else { &part.name };
+    Some((name.to_owned(), name_of(part.data_type)))
 }

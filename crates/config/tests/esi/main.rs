@@ -2,9 +2,11 @@
 //! files if they are beside the repository.
 
 mod bad_files;
+mod commands;
 mod differences;
 mod editions;
 mod images;
+mod names;
 mod reading;
 mod real_files;
 mod select;

@@ -107,6 +107,33 @@ fn sync_managers_mailboxes_and_domains_of_a_network_file_are_in_its_eni() {
     assert_eq!((pdo.name.as_str(), pdo.entries[1].name.as_str()), ("Command", "Target > \"0\""));
 }
 
+// covers: eni-run, ES-182
+#[test]
+fn an_assignment_is_cleared_filled_and_counted() {
+    let text = CELL.replacen("pdo_config = true", "pdo_config = false", 1);
+    let second = "[[subdevice.sync_manager.pdo]]\nindex = 0x160f\nentries = [{ index = 0x60ff, bits = 32 }]\n\n";
+    let text = text.replacen("index = 0x1600", "index = 0x160a", 1).replacen("index = 0x1a00", "index = 0x1a0a", 1);
+    let (head, tail) = text.split_once("[[subdevice.sync_manager]]\nnumber = 3").expect("the drive has two");
+    let text = format!("{head}{second}[[subdevice.sync_manager]]\nnumber = 3{tail}");
+    let export = network(&text).to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let written = export.configuration.declaration.subdevices[1].startup.iter().filter_map(|it| match &it.action {
+        StartupAction::Sdo(it) if matches!(it.index, 0x1600..=0x1C1F) => {
+            Some((it.index, it.sub_index, it.data.clone()))
+        }
+        _ => None,
+    });
+    let expected = [
+        (0x1C12, 0, vec![0]),
+        (0x1C12, 1, vec![0x0A, 0x16]),
+        (0x1C12, 2, vec![0x0F, 0x16]),
+        (0x1C12, 0, vec![2]),
+        (0x1C13, 0, vec![0]),
+        (0x1C13, 1, vec![0x0A, 0x1A]),
+        (0x1C13, 0, vec![1]),
+    ];
+    assert_eq!(written.collect::<Vec<_>>(), expected);
+}
+
 // covers: eni-run
 #[test]
 fn each_domain_of_a_network_file_has_an_lrw_of_its_own() {

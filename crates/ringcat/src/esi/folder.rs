@@ -27,14 +27,22 @@ pub struct EsiFolder {
 }
 
 impl EsiFolder {
-    /// Opens a folder with all folders in it. `kept`: the file in which the index is kept; without one all files are
-    /// read. A file that is refused is in the index with its reason.
+    /// Opens a folder with all folders in it, or a single file. `kept`: the file in which the index is kept; without
+    /// one all files are read. A file that is refused is in the index with its reason.
     ///
     /// # Errors
-    /// The folder cannot be read.
+    /// The folder or the file cannot be read.
     pub fn open(path: &Path, kept: Option<&Path>) -> Result<EsiFolder, EsiFailure> {
         let mut found = Vec::new();
-        collect(path, MAX_DEPTH, &mut found).map_err(|error| EsiFailure::Read { path: path.to_owned(), error })?;
+        let failed = |error| EsiFailure::Read { path: path.to_owned(), error };
+        let about = fs::metadata(path).map_err(failed)?;
+        let path = if about.is_dir() {
+            collect(path, MAX_DEPTH, &mut found).map_err(failed)?;
+            path
+        } else {
+            found.push((path.to_owned(), stamp(&about)));
+            path.parent().unwrap_or(Path::new(""))
+        };
         found.sort_by(|a, b| a.0.cmp(&b.0));
         let bytes = kept.and_then(|kept| bytes_of(kept).ok());
         let before = bytes.and_then(|bytes| Index::from_text(std::str::from_utf8(&bytes).ok()?)).unwrap_or_default();
@@ -191,6 +199,20 @@ mod tests {
         let folder = place.open();
         let found = folder.index().find(71, 3, 1, false).expect("it is described");
         assert_eq!(folder.load(&found).expect("it is there").devices[0].name.english(), "third");
+    }
+
+    // covers: esi-read
+    #[test]
+    fn a_single_file_is_opened_like_a_folder_without_its_neighbours() {
+        let place = Place::new("single");
+        place.write("one.xml", &description(1, "first"));
+        place.write("two.xml", &description(2, "second"));
+        let folder = EsiFolder::open(&place.0.join("descriptions/two.xml"), Some(&place.kept())).expect("a file");
+        assert_eq!((folder.files_read(), folder.index().devices().count()), (1, 1));
+        let found = folder.index().find(71, 2, 1, false).expect("it is described");
+        assert_eq!(folder.load(&found).expect("it is there").devices[0].name.english(), "second");
+        let again = EsiFolder::open(&place.0.join("descriptions/two.xml"), Some(&place.kept())).expect("a file");
+        assert_eq!(again.files_read(), 0);
     }
 
     // covers: esi-read
