@@ -92,7 +92,7 @@ impl Draft {
         if !(self.settings.is_empty() && self.domains.is_empty()) {
             return Err(Code::BUSY);
         }
-        let loaded = file.declaration();
+        let loaded = network::declaration(file);
         for (index, config) in loaded.subdevices.iter().enumerate() {
             self.declaration.add_without_domain(config.clone());
             self.settings.push(Settings::of_file(network::name(index, config), config.clone()));

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use ringcat::config::{Configuration, Variable};
 use ringcat::network::LoadedNetwork;
-use ringcat::{ConfigAddress, Direction, DomainId, SubDeviceConfig, SubDeviceInfo};
+use ringcat::{ConfigAddress, Declaration, Direction, DomainId, SubDeviceConfig, SubDeviceInfo};
 
 use crate::code::{Code, Outcome, report};
 use crate::settings::Name;
@@ -57,6 +57,21 @@ pub fn load(path: &str) -> Outcome<LoadedNetwork> {
         report(format_args!("{error}"));
         Code::INVALID
     })
+}
+
+/// The declaration of a file. As those of `ecrt.h`, a SubDevice is used at its exact position only, unless others
+/// before it may be absent.
+pub fn declaration(file: &LoadedNetwork) -> Declaration {
+    let mut declaration = file.declaration();
+    let is_fixed = |config: &SubDeviceConfig| !config.optional && config.group.is_none();
+    if declaration.subdevices.iter().all(is_fixed) {
+        for config in &mut declaration.subdevices {
+            if let ConfigAddress::Position(position) = config.address {
+                config.address = ConfigAddress::Alias { alias: 0, offset: position };
+            }
+        }
+    }
+    declaration
 }
 
 /// The name by which `ecrt_master_slave_config` finds a SubDevice of a file, the one at `index`. One that is found by

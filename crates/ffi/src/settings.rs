@@ -256,10 +256,8 @@ impl Settings {
             return (**config).clone();
         }
         let Name { alias, position, vendor, product } = self.name;
-        let address = match alias {
-            0 => ConfigAddress::Position(position),
-            _ => ConfigAddress::Alias { alias, offset: position },
-        };
+        // Alias 0 is the exact position.
+        let address = ConfigAddress::Alias { alias, offset: position };
         let mut config = SubDeviceConfig::at(address).expect_product(vendor, product).refused_pdos(RefusedPdos::Warn);
         for (number, sync_manager) in (0u8..).zip(&self.sync_managers) {
             config = sync_manager.declare(number, config, info);

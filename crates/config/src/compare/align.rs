@@ -43,7 +43,8 @@ pub(super) fn align(configuration: &Configuration, found: &[SubDeviceInfo], stat
     let mut taken = vec![false; found.len()];
     by_mark(configs, found, &mut info_of, &mut taken);
     let is_device = |config: usize, info: usize| is_device(&configs[config], stated.get(config), &found[info]);
-    let declared: Vec<usize> = (0..configs.len()).filter(|config| by_position(&configs[*config])).collect();
+    let mut declared: Vec<usize> = (0..configs.len()).filter(|config| by_position(&configs[*config])).collect();
+    declared.sort_by_key(|config| position(&configs[*config]));
     let free: Vec<usize> = (0..found.len()).filter(|info| !taken[*info]).collect();
     for (config, info) in common(&declared, &free, &is_device) {
         (info_of[config], taken[info]) = (Some(info), true);
@@ -66,7 +67,22 @@ pub(super) fn align(configuration: &Configuration, found: &[SubDeviceInfo], stat
             (info_of[config], taken[info]) = (Some(info), true);
         }
     }
+    if !taken.contains(&false) && !moved.contains(&true) {
+        exact_positions(configs, &info_of, &mut moved);
+    }
     in_order(&info_of, &moved, &taken)
+}
+
+/// Where each SubDevice has its counterpart in the order of positions, each has to be at its position: the file may
+/// have gaps between them, or one position twice.
+fn exact_positions(configs: &[SubDeviceConfig], info_of: &[Option<usize>], moved: &mut [bool]) {
+    let is_plain = |config: &SubDeviceConfig| by_position(config) && config.group.is_none();
+    if !configs.iter().all(is_plain) || info_of.contains(&None) {
+        return;
+    }
+    for (config, info) in info_of.iter().enumerate() {
+        moved[config] |= *info != Some(position(&configs[config]));
+    }
 }
 
 fn in_order(info_of: &[Option<usize>], moved: &[bool], taken: &[bool]) -> Vec<Place> {
@@ -92,6 +108,14 @@ fn in_order(info_of: &[Option<usize>], moved: &[bool], taken: &[bool]) -> Vec<Pl
 
 const fn by_position(config: &SubDeviceConfig) -> bool {
     matches!(config.address, ConfigAddress::Position(_) | ConfigAddress::Alias { alias: 0, .. })
+}
+
+/// The position of a SubDevice that is declared by it.
+fn position(config: &SubDeviceConfig) -> usize {
+    match config.address {
+        ConfigAddress::Position(position) | ConfigAddress::Alias { alias: 0, offset: position } => position.into(),
+        _ => usize::MAX,
+    }
 }
 
 /// SubDevices that are declared by alias or identification.

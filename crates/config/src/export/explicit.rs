@@ -19,7 +19,8 @@ const FIRST_STATION: u16 = 1001;
 /// State changes with a limit in every file.
 pub(super) const UP: [(AlState, AlState); 3] =
     [(AlState::Init, AlState::PreOp), (AlState::PreOp, AlState::SafeOp), (AlState::SafeOp, AlState::Op)];
-/// State changes with a limit in every file, those of BOOT where it is not the usual one.
+/// State changes with a limit in every file, those of BOOT if there is a mailbox for it or the limit is not the usual
+/// one.
 pub(super) const OTHERS: [(AlState, AlState); 8] = [
     (AlState::Init, AlState::Boot),
     (AlState::Boot, AlState::Init),
@@ -41,6 +42,7 @@ pub(super) fn explicit(configuration: &Configuration, lrw: &Lrw, left_out: &mut 
         }
     }
     stations(&mut whole);
+    heads(&mut whole, left_out);
     for facts in &mut whole.subdevices {
         facts.name = one_line(&facts.name);
     }
@@ -83,7 +85,7 @@ fn limits(config: &mut SubDeviceConfig) {
     for (from, to) in UP.into_iter().chain(OTHERS) {
         let limit = config.limit(from, to);
         let is_stated = config.state_timeouts.iter().any(|it| (it.from, it.to) == (from, to));
-        let is_of_boot = from == AlState::Boot || to == AlState::Boot;
+        let is_of_boot = (from == AlState::Boot || to == AlState::Boot) && config.declared_bootstrap.is_none();
         if !is_stated && (!is_of_boot || limit != usual.limit(from, to)) {
             config.state_timeouts.push(StateTimeout::new(from, to, limit));
         }
@@ -94,6 +96,17 @@ fn limits(config: &mut SubDeviceConfig) {
 fn signals(config: &mut SubDeviceConfig) {
     if let Some(sync) = config.sync.as_mut().filter(|sync| sync.sync1_cycle_ns == sync.sync0_cycle_ns) {
         sync.sync1_cycle_ns = 0;
+    }
+}
+
+/// The head of a hot connect group has no place (protocol ES-136).
+fn heads(whole: &mut Configuration, left_out: &mut Vec<LeftOut>) {
+    let mut known = HashSet::new();
+    for (index, config) in whole.declaration.subdevices.iter().enumerate() {
+        let is_head = config.group.is_some_and(|group| known.insert(group));
+        if is_head && whole.subdevices[index].plugged_into.take().is_some() {
+            left_out.push(LeftOut::new(Some(index), "plugged_into", "the head of a hot connect group has no place"));
+        }
     }
 }
 

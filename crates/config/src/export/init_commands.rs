@@ -27,8 +27,9 @@ const ACKNOWLEDGE: u8 = 0x10;
 const IDENTIFY_MS: u32 = 100;
 /// AL control: the identification is requested.
 const ID_REQUEST: u8 = 0x20;
-/// State in AL status.
+/// State in AL status; with the error bit, which has to be clear on the way up.
 const STATE_MASK: [u8; 2] = [0x0F, 0];
+const STATE_AND_ERROR: [u8; 2] = [0x1F, 0];
 /// A read of the EEPROM, in register SII_CONTROL.
 const READ: [u8; 2] = [0x00, 0x01];
 
@@ -63,7 +64,9 @@ pub(super) fn complete(
     let (mailboxes, data): (Vec<_>, Vec<_>) = declared.iter().partition(|it| it.role.direction().is_none());
     out.begin_in_init(config, !mailboxes.is_empty());
     out.begin(config);
-    mailboxes.iter().for_each(|it| out.clear_sync_manager(&[Ip, Ib, Pi, Si, Oi], it.index));
+    let ways: &[Transition] =
+        if config.declared_bootstrap.is_some() { &[Ip, Ib, Pi, Si, Oi, Bi] } else { &[Ip, Ib, Pi, Si, Oi] };
+    mailboxes.iter().for_each(|it| out.clear_sync_manager(ways, it.index));
     mailboxes.into_iter().for_each(|it| out.sync_manager(Ip, it.index, &it.register));
     if let Some(both) = &config.declared_bootstrap {
         both.iter().for_each(|it| out.sync_manager(Ib, it.index, &it.register));
@@ -279,7 +282,11 @@ impl Commands {
         self.list.push(request);
         for transition in transitions {
             let Some(timeout_ms) = limit(transition) else { continue };
-            let validate = Validate { data: vec![state.code(), 0], mask: Some(STATE_MASK.to_vec()), timeout_ms };
+            let mask = match transition {
+                Transition::Ip | Transition::Ps | Transition::So | Transition::Ib | Transition::Po => STATE_AND_ERROR,
+                _ => STATE_MASK,
+            };
+            let validate = Validate { data: vec![state.code(), 0], mask: Some(mask.to_vec()), timeout_ms };
             self.check(&[transition], &format!("check device state for {to}"), map::AL_STATUS, validate);
         }
     }

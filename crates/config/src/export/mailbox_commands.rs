@@ -2,7 +2,7 @@
 
 use ringcat_engine::config::{
     FileRead, FileWrite, IdnRead, IdnWrite, IpSettings, MailMessage, SdoDownload, SdoUpload, StartupAction,
-    StartupCommand,
+    StartupCommand, Transition,
 };
 use ringcat_wire::mailbox::foe::FoeMessage;
 
@@ -41,7 +41,12 @@ pub(super) fn add(startup: &[StartupCommand], order: &Order, mailbox: &mut Mailb
                 mailbox.others.push(message(command, "FoE", &foe(&request), place(order, Section::FoE)));
             }
             StartupAction::FileWrite(of) => {
-                let size = mailbox.send.map_or(SMALL_MAILBOX, |send| send.length.into());
+                let boot = mailbox.bootstrap.map(|(send, _)| send);
+                let send = match command.transition {
+                    Transition::Ib | Transition::Bi => boot.or(mailbox.send),
+                    _ => mailbox.send,
+                };
+                let size = send.map_or(SMALL_MAILBOX, |send| send.length.into());
                 let place = place(order, Section::FoE);
                 let messages = file(of, FoeMessage::max_data(size)).into_iter();
                 mailbox.others.extend(messages.map(|data| message(command, "FoE", &data, place)));

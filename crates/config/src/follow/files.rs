@@ -19,17 +19,22 @@ pub(super) struct Transfer<'a> {
     pub action: Result<StartupAction, String>,
 }
 
-/// The transfers of the commands of a SubDevice that are not disabled.
+/// The transfers of the commands of a SubDevice. A disabled request is none, and neither are the packets behind it.
 pub(super) fn transfers(commands: &[RawMailCommand]) -> Vec<Transfer<'_>> {
-    let mut rest = commands.iter().filter(|command| command.protocol == PROTOCOL && !command.disabled).peekable();
+    let mut rest = commands.iter().filter(|command| command.protocol == PROTOCOL).peekable();
     let mut found = Vec::new();
     while let Some(command) = rest.next() {
         let behind = |next: &&RawMailCommand| next.transitions == command.transitions && !is_request(&next.data);
         let mut packets = Vec::new();
         while let Some(next) = rest.next_if(behind) {
-            packets.push(next.data.as_slice());
+            packets.extend((!next.disabled).then_some(next.data.as_slice()));
         }
-        found.push(Transfer { command, action: action(&command.data, &packets) });
+        let action = match (command.disabled, packets.is_empty()) {
+            (true, true) => continue,
+            (true, false) => Err("its request is disabled, packets behind it are not: not sent".to_owned()),
+            (false, _) => action(&command.data, &packets),
+        };
+        found.push(Transfer { command, action });
     }
     found
 }

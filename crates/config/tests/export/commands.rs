@@ -25,8 +25,8 @@ fn at(subdevice: &SubDevice, transition: Transition) -> Vec<Line> {
 }
 
 /// The request of a state and its check.
-fn state(request: u8, code: u8, timeout_ms: u32) -> [Line; 2] {
-    [(0x0120, vec![request, 0], None), (0x0130, vec![0, 0], Some((vec![code, 0], Some(vec![0x0F, 0]), timeout_ms)))]
+fn state(request: u8, code: u8, mask: u8, timeout_ms: u32) -> [Line; 2] {
+    [(0x0120, vec![request, 0], None), (0x0130, vec![0, 0], Some((vec![code, 0], Some(vec![mask, 0]), timeout_ms)))]
 }
 
 fn contains(lines: &[Line], wanted: &[Line]) -> bool {
@@ -40,23 +40,25 @@ fn each_state_change_is_requested_and_waited_for() {
     let drive = &eni.subdevices[1];
     let config = &network(CELL).configuration().declaration.subdevices[1];
     let limit = |from, to| u32::try_from(config.limit(from, to).as_millis()).expect("it fits");
-    use ringcat_wire::al::AlState::{Init, Op, PreOp, SafeOp};
+    use ringcat_wire::al::AlState::{Boot, Init, Op, PreOp, SafeOp};
     let first = at(drive, Transition::Ip);
-    assert_eq!(first[..2], state(0x11, 1, 3000), "an error of a SubDevice with a mailbox is acknowledged");
-    assert_eq!(at(&eni.subdevices[0], Transition::Ip)[..2], state(0x01, 1, 3000), "there is no mailbox");
-    for (transition, code, limit) in [
-        (Transition::Ip, 2, limit(Init, PreOp)),
-        (Transition::Ps, 4, limit(PreOp, SafeOp)),
-        (Transition::So, 8, limit(SafeOp, Op)),
-        (Transition::Os, 4, limit(Op, SafeOp)),
-        (Transition::Sp, 2, limit(SafeOp, PreOp)),
-        (Transition::Op, 2, limit(Op, PreOp)),
-        (Transition::Pi, 1, limit(PreOp, Init)),
-        (Transition::Si, 1, limit(SafeOp, Init)),
-        (Transition::Oi, 1, limit(Op, Init)),
+    assert_eq!(first[..2], state(0x11, 1, 0x0F, 3000), "an error of a SubDevice with a mailbox is acknowledged");
+    assert_eq!(at(&eni.subdevices[0], Transition::Ip)[..2], state(0x01, 1, 0x0F, 3000), "there is no mailbox");
+    for (transition, code, mask, limit) in [
+        (Transition::Ip, 2, 0x1F, limit(Init, PreOp)),
+        (Transition::Ps, 4, 0x1F, limit(PreOp, SafeOp)),
+        (Transition::So, 8, 0x1F, limit(SafeOp, Op)),
+        (Transition::Os, 4, 0x0F, limit(Op, SafeOp)),
+        (Transition::Sp, 2, 0x0F, limit(SafeOp, PreOp)),
+        (Transition::Op, 2, 0x0F, limit(Op, PreOp)),
+        (Transition::Pi, 1, 0x0F, limit(PreOp, Init)),
+        (Transition::Si, 1, 0x0F, limit(SafeOp, Init)),
+        (Transition::Oi, 1, 0x0F, limit(Op, Init)),
+        (Transition::Ib, 3, 0x1F, limit(Init, Boot)),
+        (Transition::Bi, 1, 0x0F, limit(Boot, Init)),
     ] {
         let lines = at(drive, transition);
-        assert!(contains(&lines, &state(code, code, limit)), "{transition:?}: {lines:x?}");
+        assert!(contains(&lines, &state(code, code, mask, limit)), "{transition:?}: {lines:x?}");
     }
 }
 
@@ -104,6 +106,12 @@ fn addresses_cables_groups_and_places_of_a_written_file_are_those_of_the_network
         assert!(eni.subdevices[head].previous_ports.is_empty(), "a head has no place");
         assert!(group.members >= 1 && !group.identify.is_empty());
     }
+    let mut plugged = network(CELL);
+    let into = plugged.subdevice[1].plugged_into.clone();
+    plugged.subdevice[2].plugged_into = into;
+    let export = plugged.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    assert!(model(&export.text).subdevices[2].previous_ports.is_empty());
+    assert!(export.left_out.iter().any(|it| it.what == "plugged_into"), "{:?}", export.left_out);
     let drive = &eni.subdevices[1];
     let port = &drive.previous_ports[0];
     assert!(port.selected && port.station == Some(1001));

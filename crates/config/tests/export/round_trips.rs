@@ -3,11 +3,13 @@
 use std::fs;
 use std::path::Path;
 
+use ringcat_config::network::Bytes;
+use ringcat_config::network::model::{At, Startup, WriteFile};
 use ringcat_config::{Configuration, ExportOptions, LrwUse, eni, follow};
 use ringcat_engine::config::{FileRead, FileWrite, StartupAction, SubDeviceConfig};
 use ringcat_wire::al::AlState;
 
-use crate::{SMALL, again, configured, model};
+use crate::{CELL, SMALL, again, configured, model, network};
 
 /// A RingCAT example: packed outputs, a copy, a drive with its own mapping and SYNC0, one LRW for all.
 const MACHINE: &str = include_str!("../../../ringcat/examples/machine.eni.xml");
@@ -220,4 +222,26 @@ fn transfers_of_files_keep_their_contents_when_exported() {
         assert_eq!(kept, Some(&FileWrite::new("gains", contents).with_password(0x0102_0304)));
         assert!(startup.iter().any(|command| command.action == StartupAction::FileRead(FileRead::new("log"))));
     }
+}
+
+/// In BOOT the mailbox has another size.
+// covers: 6.4, 8.2, eni-run
+#[test]
+fn packets_of_a_file_are_as_large_as_the_mailbox_of_their_state_takes() {
+    let mut file = network(CELL);
+    let write = |at, name: &str| {
+        let write_file = Some(WriteFile { name: name.to_owned(), password: 0, data: Bytes(vec![7; 1000]) });
+        Startup { at, write_file, ..Startup::default() }
+    };
+    file.subdevice[1].startup.push(write(At::Ib, "firmware"));
+    file.subdevice[1].startup.push(write(At::Ps, "gains"));
+    file.subdevice[1].mailbox.as_mut().expect("mailboxes").boot_write.as_mut().expect("one of BOOT").length = 64;
+    let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let mailbox = model(&export.text).subdevices[1].mailbox.clone().expect("a mailbox");
+    let longest = |of: ringcat_config::eni::Transition| {
+        let all = mailbox.others.iter().filter(|it| it.protocol == "FoE" && it.transitions == [of]);
+        all.map(|it| it.data.len()).max()
+    };
+    assert_eq!(longest(ringcat_config::eni::Transition::Ib), Some(64 - 6));
+    assert_eq!(longest(ringcat_config::eni::Transition::Ps), Some(128 - 6));
 }

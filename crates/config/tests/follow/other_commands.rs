@@ -188,6 +188,30 @@ fn messages_that_are_no_whole_file_are_noted() {
     }
 }
 
+// covers: 6.4, 8.2, eni-image
+#[test]
+fn a_disabled_request_of_a_file_ends_the_transfer_before_it() {
+    let disabled =
+        |comment: &str, data: &str| file("PS", comment, data).replace("</Data>", "</Data><Disabled>1</Disabled>");
+    let off = WRITE.replace("612e747874", "6f6666");
+    let all = files(&[
+        file("PS", "keep", WRITE),
+        file("PS", "", PACKET_1),
+        disabled("", PACKET_2),
+        disabled("off", &off),
+        disabled("", PACKET_1),
+        file("PS", "", PACKET_2),
+    ]);
+    let config = drive(&all);
+    let keep = FileWrite::new("a.txt", b"12").with_password(7);
+    assert_eq!(commented(&config, "keep")[0].action, StartupAction::FileWrite(keep));
+    assert!(commented(&config, "off").is_empty());
+    assert!(has_notice(&all, &["FoE/InitCmd \"off\"", "its request is disabled, packets behind it are not: not sent"]));
+    let quiet =
+        files(&[file("PS", "keep", WRITE), file("PS", "", PACKET_1), disabled("off", &off), disabled("", PACKET_1)]);
+    assert!(!has_notice(&quiet, &["FoE/InitCmd"]), "{:#?}", notices(&quiet));
+}
+
 /// Commands of the MainDevice in front of the first SubDevice.
 fn with_bus(commands: &str) -> ringcat_config::Configuration {
     let at = SMALL.find("<Slave>").unwrap();

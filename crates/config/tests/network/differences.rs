@@ -54,6 +54,25 @@ fn one_missing_or_additional_subdevice_is_one_difference() {
     assert_eq!(differences(&file_of(&[]), &bus(&[1, 2])).len(), 2);
 }
 
+/// The order of the file is not that of the positions.
+// covers: network-file
+#[test]
+fn positions_of_a_file_count_and_not_the_order_of_its_tables() {
+    let mut file = file_of(&bus(&[1, 2, 3]));
+    let places = |file: &mut NetworkFile, places: [u16; 3]| {
+        for (subdevice, place) in file.subdevice.iter_mut().zip(places) {
+            subdevice.position = Some(place);
+        }
+    };
+    places(&mut file, [2, 0, 1]);
+    assert_eq!(differences(&file, &bus(&[2, 3, 1])), []);
+    assert_eq!(differences(&file, &bus(&[1, 2, 3])), [(Order, Some(0), Some(0))]);
+    places(&mut file, [0, 1, 14]);
+    assert_eq!(differences(&file, &bus(&[1, 2, 3])), [(Order, Some(2), Some(2))]);
+    places(&mut file, [0, 1, 1]);
+    assert_eq!(differences(&file, &bus(&[1, 2, 3])), [(Order, Some(2), Some(2))]);
+}
+
 // covers: network-file
 #[test]
 fn another_revision_or_serial_number_is_no_change_of_place() {

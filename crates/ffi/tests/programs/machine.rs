@@ -1,6 +1,6 @@
 //! Whole programs on simulated machines: the examples, all services, cycles without allocation.
 
-use crate::library::{here, on_segment, outputs, program, root};
+use crate::library::{here, on_segment, outputs, program, root, workshop};
 
 // covers: c-interface
 #[test]
@@ -102,5 +102,16 @@ fn each_service_does_its_work_on_simulated_subdevices() {
 fn cyclic_calls_allocate_nothing_and_a_second_caller_is_refused() {
     let Some(realtime) = program(&here().join("tests/c/realtime.c"), &[]) else { return };
     let (output, ended) = on_segment(&realtime, &here().join("tests/c/services.toml"), &[]);
+    assert_eq!(ended, Ok(()), "{output}");
+}
+
+// covers: c-interface
+#[test]
+fn a_configuration_is_for_the_subdevice_at_its_position_alone() {
+    let Some(places) = program(&here().join("tests/c/places.c"), &[]) else { return };
+    let segment = workshop().join("places.toml");
+    let devices = ["digital-output-8", "digital-output-16"].map(|kind| format!("[[device]]\ntype = \"{kind}\"\n"));
+    std::fs::write(&segment, format!("[segment]\n{}", devices.concat())).expect("a file");
+    let (output, ended) = on_segment(&places, &segment, &[]);
     assert_eq!(ended, Ok(()), "{output}");
 }
