@@ -74,7 +74,7 @@ pub(super) fn align(configuration: &Configuration, found: &[SubDeviceInfo], stat
 }
 
 /// Where each SubDevice has its counterpart in the order of positions, each has to be at its position: the file may
-/// have gaps between them, or one position twice.
+/// have gaps between them.
 fn exact_positions(configs: &[SubDeviceConfig], info_of: &[Option<usize>], moved: &mut [bool]) {
     let is_plain = |config: &SubDeviceConfig| by_position(config) && config.group.is_none();
     if !configs.iter().all(is_plain) || info_of.contains(&None) {

@@ -6,6 +6,7 @@ use ringcat_engine::config::MailMessage;
 
 use super::error::{Fault, Step};
 use super::model::{At, Junctions, NetworkFile, Startup, SubDevice, SyncManager};
+use super::write::next_position;
 
 /// Maximum number of SubDevices: positions have 16 bits, and the last one is reserved.
 const MAX_SUBDEVICES: usize = 65_534;
@@ -37,6 +38,7 @@ pub(super) fn check(file: &NetworkFile) -> Checked {
     clocks(file, &names)?;
     redundancy(file, &names)?;
     groups(file)?;
+    positions(file)?;
     for (index, subdevice) in file.subdevice.iter().enumerate() {
         of_subdevice(file, index, subdevice, &names).map_err(|fault| {
             let mut path = vec!["subdevice".into(), index.into()];
@@ -175,6 +177,23 @@ fn groups(file: &NetworkFile) -> Checked {
     Ok(())
 }
 
+/// Each SubDevice that is found by its position has one of its own.
+fn positions(file: &NetworkFile) -> Checked {
+    let (mut known, mut next) = (BTreeMap::new(), 0);
+    for (index, subdevice) in file.subdevice.iter().enumerate() {
+        let is_marked = subdevice.alias.is_some() || subdevice.identification.is_some();
+        if subdevice.group.is_none() && !is_marked {
+            let own = subdevice.position.unwrap_or(next);
+            if let Some(first) = known.insert(own, index) {
+                let message = format!("{own} is also the position of subdevice[{first}]");
+                return fault(["subdevice".into(), index.into(), "position".into()], message);
+            }
+        }
+        next = next_position(next, subdevice);
+    }
+    Ok(())
+}
+
 fn of_subdevice(file: &NetworkFile, index: usize, subdevice: &SubDevice, names: &BTreeMap<&str, usize>) -> Checked {
     let places = [subdevice.position, subdevice.alias, subdevice.identification];
     if places.iter().flatten().count() > 1 {
@@ -256,6 +275,11 @@ fn sync(subdevice: &SubDevice) -> Checked {
             let message = format!("expected {least}ns to {LONGEST_SHIFT_NS}ns, got {time}");
             return fault(["sync".into(), key.into()], message);
         }
+    }
+    let (sync0, sync1) = (sync.sync0_cycle, sync.sync1_cycle);
+    if sync0.0 > 0 && sync1.0 % sync0.0 != 0 {
+        let message = format!("expected 0 or a multiple of sync0_cycle, {sync0}, got {sync1}");
+        return fault(["sync".into(), "sync1_cycle".into()], message);
     }
     Ok(())
 }

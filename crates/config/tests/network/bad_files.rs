@@ -101,6 +101,16 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ("elements = 0x48", "elements = 0", "subdevice[1].startup[8].read_idn.elements: expected at least one bit, got 0"),
     ("aoe = \"05 06", "aoe = \"06", "subdevice[1].startup[9].aoe: expected an AMS header with a request"),
     ("voe = \"47 0c 00 00", "voe = \"47 0c", "subdevice[1].startup[10].voe: expected vendor, type and data"),
+    (
+        "position = 1\n",
+        "position = 0\n",
+        "SubDevice \"Drive\": subdevice[1].position: 0 is also the position of subdevice[0]",
+    ),
+    (
+        "sync1_cycle = \"1ms\"",
+        "sync1_cycle = \"1100us\"",
+        "subdevice[1].sync.sync1_cycle: expected 0 or a multiple of sync0_cycle, 250us, got 1100us",
+    ),
     ("name = \"gains.txt\"", "name = \"\"", "subdevice[1].startup[13].write_file.name: expected the name of a file"),
     (
         "name = \"log.txt\"",
