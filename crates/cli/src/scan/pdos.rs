@@ -118,6 +118,10 @@ mod tests {
     // covers: esi-use
     #[test]
     fn pdos_are_listed_with_names_of_the_eeprom_else_of_the_description() {
+        if !std::path::Path::new(FILES).exists() {
+            println!("skipped: a package has no descriptions, {FILES} is not there");
+            return;
+        }
         let place = Place::new();
         let segment = Network::from_description(load_segment(&place.0.join("bus.toml")).unwrap()).unwrap();
         let mut main_device = MainDevice::request(SimulatedSegment::new(segment), &Options::default());
