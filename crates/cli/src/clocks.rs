@@ -21,7 +21,7 @@ use ringcat::{
 
 use crate::access::{Access, AccessArguments, WireLinks};
 use crate::clock_options::{ClockOptions, farthest};
-use crate::descriptions::EsiArgument;
+use crate::descriptions::{EsiArgument, complete};
 use crate::ending::EndRequest;
 use crate::failure::Failure;
 use crate::interfaces::now;
@@ -85,6 +85,7 @@ pub fn run(arguments: &ClocksArguments) -> Result<Report, Failure> {
     arguments.access.interfaces.links.check()?;
     // An unwritable file shows before the measurement.
     let mut picture = arguments.plot.as_ref().map(|path| Picture::create(path)).transpose()?;
+    let mut descriptions = arguments.esi.open()?;
     let end = EndRequest::watch(thread.priority)?;
     let access = arguments.access.begin(&arguments.access.interfaces.options())?;
     let Access { supervisor, cyclic, surroundings, recording, tenure, awake: _awake, .. } = access;
@@ -93,7 +94,7 @@ pub fn run(arguments: &ClocksArguments) -> Result<Report, Failure> {
         Some(scan) => scan,
         None => supervisor.scan().map_err(|error| surroundings.explain(error, supervisor.counters().foreign))?,
     };
-    let objects = arguments.esi.complete(&mut scan.subdevices, &[])?;
+    let objects = complete(descriptions.as_mut(), &mut scan.subdevices, &[])?;
     let names = Names(scan.subdevices.iter().map(|info| info.name.clone()).collect());
     let mut declaration = automatic(&scan.subdevices, arguments.cycle);
     arguments.options.declare(&mut declaration, &scan.subdevices)?;

@@ -8,7 +8,7 @@ use ringcat::eni::EniFile;
 use ringcat::network::LoadedNetwork;
 
 use crate::bus::{BusArguments, Wanted};
-use crate::descriptions::EsiArgument;
+use crate::descriptions::{EsiArgument, complete};
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::network::{Compare, Difference};
@@ -63,10 +63,7 @@ pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
         firmware: with_firmware.contains(&(info.identity.vendor_id, info.identity.product_code)),
         modules: descriptions.as_mut().is_some_and(|it| it.has_slots(info)),
     })?;
-    let described = match &mut descriptions {
-        Some(descriptions) => descriptions.complete(&mut bus.scan.subdevices, &bus.modules)?,
-        None => arguments.esi.complete(&mut bus.scan.subdevices, &[])?,
-    };
+    let described = complete(descriptions.as_mut(), &mut bus.scan.subdevices, &bus.modules)?;
     let found = &bus.scan.subdevices;
     let network = FoundNetwork { subdevices: found, topology: &bus.scan.topology, firmware: &bus.firmware };
     let mut differences = configuration.differences(network, &stated);

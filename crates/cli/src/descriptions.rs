@@ -30,7 +30,8 @@ pub struct EsiArgument {
 }
 
 impl EsiArgument {
-    /// Opens the folder with its index, where there is one.
+    /// Opens the folder with its index, where there is one: before anything is sent, so that a wrong path changes
+    /// nothing.
     pub fn open(&self) -> Result<Option<Descriptions>, Failure> {
         let Some(path) = &self.esi else { return Ok(None) };
         let kept = EsiFolder::default_index(path);
@@ -41,14 +42,18 @@ impl EsiArgument {
         }
         Ok(Some(Descriptions { folder, loaded: Vec::new() }))
     }
+}
 
-    /// The names of a scan: completes those of the SubDevices, and returns those of their objects. What has no
-    /// description is reported once.
-    pub fn complete(&self, found: &mut [SubDeviceInfo], idents: &[Vec<u32>]) -> Result<Vec<ObjectNames>, Failure> {
-        match self.open()? {
-            Some(mut descriptions) => descriptions.complete(found, idents),
-            None => Ok(found.iter().map(own).collect()),
-        }
+/// The names of a scan: completes those of the SubDevices, and returns those of their objects. With descriptions, what
+/// has none is reported once.
+pub fn complete(
+    descriptions: Option<&mut Descriptions>,
+    found: &mut [SubDeviceInfo],
+    idents: &[Vec<u32>],
+) -> Result<Vec<ObjectNames>, Failure> {
+    match descriptions {
+        Some(descriptions) => descriptions.complete(found, idents),
+        None => Ok(found.iter().map(own).collect()),
     }
 }
 
@@ -124,7 +129,7 @@ impl Descriptions {
     }
 
     /// The same, and the names of all objects.
-    pub fn complete(&mut self, found: &mut [SubDeviceInfo], idents: &[Vec<u32>]) -> Result<Vec<ObjectNames>, Failure> {
+    fn complete(&mut self, found: &mut [SubDeviceInfo], idents: &[Vec<u32>]) -> Result<Vec<ObjectNames>, Failure> {
         self.name_subdevices(found);
         let (mut all, mut missing) = (Vec::with_capacity(found.len()), Vec::new());
         let mut known: Vec<(Kind, Arc<ObjectNames>)> = Vec::new();

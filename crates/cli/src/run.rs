@@ -21,6 +21,7 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use ringcat::AlState;
+use ringcat::config::ObjectNames;
 use ringcat::event_log::EventLog;
 use ringcat::text::{Names, address_of_sender, describe};
 use ringcat::{
@@ -29,6 +30,7 @@ use ringcat::{
 };
 
 use crate::access::{Access, WireLinks};
+use crate::descriptions::complete;
 use crate::ending::EndRequest;
 use crate::failure::Failure;
 use crate::interfaces::{LinkNames, now};
@@ -60,6 +62,7 @@ type Started = (CyclicThread<WireLinks>, Watched, Vec<SentOnce>, Jobs);
 /// Runs cycles. It has held where all SubDevices reached OP and stayed there, and every cycle afterwards was complete.
 pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
     arguments.access.interfaces.links.check()?;
+    let mut descriptions = arguments.esi.open()?;
     let end = EndRequest::watch(arguments.access.thread.priority)?;
     let (access, network) = begin(arguments)?;
     let Access { interfaces, supervisor, mut cyclic, mut surroundings, recording, tenure, awake: _awake } = access;
@@ -69,11 +72,8 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
         Some(scan) => scan,
         None => scan(&supervisor, &mut cyclic, &mut surroundings, begin)?,
     };
-    let described = arguments.esi.complete(&mut scan.subdevices, &[])?;
-    let (names, objects) = match &network {
-        Some(network) => (network.names(), network.objects(&scan.subdevices, described)),
-        None => (Names(scan.subdevices.iter().map(|info| info.name.clone()).collect()), described),
-    };
+    let described = complete(descriptions.as_mut(), &mut scan.subdevices, &[])?;
+    let (names, objects) = names(network.as_ref(), &scan, described);
     let declaration = arguments.declared.declare(network.as_ref(), &scan.subdevices)?;
     let declaration = arguments.resend.adapt(declaration.with_under_way(arguments.under_way.under_way));
     let undeclared = network.as_ref().map_or(0, |network| {
@@ -167,6 +167,14 @@ fn scan(
 }
 
 /// Activates what is declared, with the connections of junctions and what makes cycles begin.
+/// Names of the declared SubDevices, and of their objects.
+fn names(network: Option<&ConfiguredNetwork>, scan: &Scan, described: Vec<ObjectNames>) -> (Names, Vec<ObjectNames>) {
+    match network {
+        Some(network) => (network.names(), network.objects(&scan.subdevices, described)),
+        None => (Names(scan.subdevices.iter().map(|info| info.name.clone()).collect()), described),
+    }
+}
+
 fn activate(
     arguments: &RunArguments,
     network: Option<&ConfiguredNetwork>,

@@ -7,7 +7,7 @@ use ringcat::text::{Names, describe};
 use ringcat::{Event, MainDevice, Scan};
 
 use crate::access::{Access, AccessArguments};
-use crate::descriptions::EsiArgument;
+use crate::descriptions::{Descriptions, EsiArgument, complete};
 use crate::ending::EndRequest;
 use crate::failure::Failure;
 use crate::json::data::Data;
@@ -43,8 +43,9 @@ pub struct ScanArguments {
 /// Scans and prints what was found; what happens meanwhile goes to the standard error output.
 pub fn run(arguments: &ScanArguments) -> Result<Report, Failure> {
     EndRequest::at_once()?;
+    let descriptions = arguments.esi.open()?;
     if arguments.access.master.is_some() {
-        return known(arguments);
+        return known(arguments, descriptions);
     }
     let AccessArguments { interfaces, thread, recording, .. } = &arguments.access;
     let links = interfaces.open(*thread)?;
@@ -66,19 +67,19 @@ pub fn run(arguments: &ScanArguments) -> Result<Report, Failure> {
         eprintln!("{foreign} frames of another MainDevice arrived during the scan: {}", surroundings.senders());
     }
     drop(main_device);
-    let data = show(arguments, scan)?;
+    let data = show(arguments.pdos, descriptions, scan)?;
     let verdict = Verdict::Held(counted(data.subdevices.len(), "SubDevice", "SubDevices")).and(recording.finish());
     Ok(Report { verdict, data: Data::Scan(data) })
 }
 
 /// Prints what was found, with the names of descriptions.
-fn show(arguments: &ScanArguments, mut scan: Scan) -> Result<scan::Scan, Failure> {
-    let objects = arguments.esi.complete(&mut scan.subdevices, &[])?;
+fn show(with_pdos: bool, mut descriptions: Option<Descriptions>, mut scan: Scan) -> Result<scan::Scan, Failure> {
+    let objects = complete(descriptions.as_mut(), &mut scan.subdevices, &[])?;
     let mut json = table::json(&scan);
     for line in table::lines(&scan) {
         say!("{line}");
     }
-    if arguments.pdos {
+    if with_pdos {
         for ((info, names), json) in scan.subdevices.iter().zip(&objects).zip(&mut json.subdevices) {
             let pdos = pdos::json(info, names);
             pdos::lines(info, &pdos).iter().for_each(|line| say!("{line}"));
@@ -89,7 +90,7 @@ fn show(arguments: &ScanArguments, mut scan: Scan) -> Result<scan::Scan, Failure
 }
 
 /// What a daemon knows of the bus of a master. Nothing is scanned: a daemon does that after each change.
-fn known(arguments: &ScanArguments) -> Result<Report, Failure> {
+fn known(arguments: &ScanArguments, descriptions: Option<Descriptions>) -> Result<Report, Failure> {
     let access = &arguments.access;
     let Access { supervisor, cyclic, recording, tenure, .. } = access.begin(&access.interfaces.options())?;
     let scan = match tenure.scan() {
@@ -97,7 +98,7 @@ fn known(arguments: &ScanArguments) -> Result<Report, Failure> {
         None => supervisor.scan()?,
     };
     drop(cyclic);
-    let data = show(arguments, scan)?;
+    let data = show(arguments.pdos, descriptions, scan)?;
     let verdict = Verdict::Held(counted(data.subdevices.len(), "SubDevice", "SubDevices"));
     let verdict = verdict.and(tenure.end()).and(recording.finish());
     Ok(Report { verdict, data: Data::Scan(data) })

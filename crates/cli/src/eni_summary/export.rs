@@ -1,11 +1,12 @@
 //! `ringcat eni export`: an ENI of a network file, or of another ENI.
 
+use std::collections::HashMap;
 use std::fs::{self, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use ringcat::config::{Export, ExportDetails, ExportError, ExportOptions, LrwUse, export};
+use ringcat::config::{self, Export, ExportDetails, ExportError, ExportOptions, LrwUse, export};
 use ringcat::eni::EniFile;
 use ringcat::network::LoadedNetwork;
 
@@ -17,6 +18,9 @@ use crate::verdict::{Report, Verdict};
 
 /// The name of the standard output.
 const STANDARD_OUTPUT: &str = "-";
+
+/// SubDevices that a warning lists.
+const LISTED: usize = 8;
 
 /// What a user should know before.
 const ABOUT_EXPORT: &str = "\
@@ -71,6 +75,29 @@ impl From<Lrw> for LrwUse {
     }
 }
 
+/// A line per setting and reason, in the order of their first SubDevices: hundreds of equal lines would hide the
+/// others.
+fn in_groups(left_out: &[config::LeftOut]) -> Vec<String> {
+    let mut groups: Vec<(&config::LeftOut, Vec<String>)> = Vec::new();
+    let mut known: HashMap<(&str, &str), usize> = HashMap::new();
+    for it in left_out {
+        let group = *known.entry((&it.what, &it.reason)).or_insert_with(|| {
+            groups.push((it, Vec::new()));
+            groups.len() - 1
+        });
+        groups[group].1.extend(it.subdevice.map(|index| index.to_string()));
+    }
+    let line = |(first, subdevices): (&config::LeftOut, Vec<String>)| {
+        if subdevices.len() < 2 {
+            return first.to_string();
+        }
+        let more = if subdevices.len() > LISTED { ", ..." } else { "" };
+        let listed = subdevices.iter().take(LISTED).map(String::as_str).collect::<Vec<&str>>().join(", ");
+        format!("{} SubDevices ({listed}{more}): {}: {}", subdevices.len(), first.what, first.reason)
+    };
+    groups.into_iter().map(line).collect()
+}
+
 /// Writes the file.
 pub fn run(arguments: &ExportArguments) -> Result<Report, Failure> {
     let out = &arguments.out;
@@ -82,7 +109,7 @@ pub fn run(arguments: &ExportArguments) -> Result<Report, Failure> {
         return Err(Failure::new(format!("{} exists: name another file, or add --overwrite", out.display())));
     }
     let export = made(arguments)?;
-    export.left_out.iter().for_each(|it| warn(format!("not in the ENI: {it}")));
+    in_groups(&export.left_out).iter().for_each(|line| warn(format!("not in the ENI: {line}")));
     if is_standard {
         output::write_file(&export.text);
     } else {

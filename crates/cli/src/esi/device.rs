@@ -37,6 +37,14 @@ pub fn read(path: &Path) -> Result<Esi, Failure> {
 }
 
 impl DeviceArguments {
+    /// The options that were given.
+    fn wanted(&self) -> String {
+        let kind = self.kind.as_ref().map(|kind| format!(" type \"{}\"", kind.trim().escape_debug()));
+        let revision = self.revision.map(|revision| format!(" revision {revision:#010x}"));
+        let product = self.product.map(|product| format!(" product {product:#010x}"));
+        [kind, revision, product].into_iter().flatten().collect()
+    }
+
     /// The device in its description.
     pub fn choose<'a>(&self, esi: &'a Esi) -> Result<&'a Device, Failure> {
         let wanted = |device: &&Device| {
@@ -56,9 +64,9 @@ impl DeviceArguments {
                 };
                 let kinds: Vec<String> = esi.devices.iter().map(|it| kind(&it)).collect();
                 let what = match (found.is_empty(), is_one_type) {
-                    (true, _) => "there is no such device",
-                    (false, true) => "give --product",
-                    (false, false) => "give --type",
+                    (true, _) => format!("there is no such device:{}", self.wanted()),
+                    (false, true) => "give --product".to_owned(),
+                    (false, false) => "give --type".to_owned(),
                 };
                 let more =
                     if kinds.len() > NAMED { format!(" and {} more", kinds.len() - NAMED) } else { String::new() };

@@ -72,7 +72,7 @@ mod tests {
     use ringcat::{MainDevice, Options};
 
     use super::*;
-    use crate::descriptions::EsiArgument;
+    use crate::descriptions::{EsiArgument, complete};
 
     const FILES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/tests/files");
 
@@ -111,7 +111,7 @@ mod tests {
 
     fn listed(found: &mut [SubDeviceInfo], options: &[&str]) -> Vec<String> {
         let line = Line::parse_from([&["ringcat"], options].concat());
-        let names = line.esi.complete(found, &[]).unwrap();
+        let names = complete(line.esi.open().unwrap().as_mut(), found, &[]).unwrap();
         lines(&found[0], &json(&found[0], &names[0]))
     }
 
@@ -141,6 +141,6 @@ mod tests {
         let vendor = found[0].identity.vendor_id;
         found[0].identity.vendor_id = vendor + 1;
         assert_eq!(listed(&mut found, &["--esi", &acme]), without, "no description of this vendor");
-        assert!(Line::parse_from(["ringcat", "--esi", "/no-such"]).esi.complete(&mut found, &[]).is_err());
+        assert!(Line::parse_from(["ringcat", "--esi", "/no-such"]).esi.open().is_err());
     }
 }

@@ -205,6 +205,17 @@ fn pdos_of_modules_get_their_names_by_detected_idents_or_by_their_entries() {
     }
 }
 
+/// The interface does not exist: the descriptions are looked for first, so that a wrong path changes nothing.
+// covers: esi-use
+#[test]
+fn descriptions_that_are_not_there_are_refused_before_a_bus_is_opened() {
+    for command in [&["scan"][..], &["run"], &["clocks"]] {
+        let refused = ringcat(&[command, &["--main", "no-such-if", "--esi", "/no-such.xml"]].concat());
+        assert_eq!(refused.code, Some(2), "{}", refused.all());
+        assert!(refused.all().contains("/no-such.xml"), "{command:?}: {}", refused.all());
+    }
+}
+
 // covers: network-file, esi-use
 #[test]
 fn differences_name_pdos_and_entries_by_the_file_else_by_the_description() {
@@ -286,7 +297,11 @@ fn images_are_built_compared_and_described_again() {
     let skeleton = ringcat(&["sii", "skeleton", &image, "--out", &place.path("again.xml")]);
     assert!(skeleton.code == Some(0) && place.read("again.xml").contains("ProductCode"), "{}", skeleton.all());
     let unknown = ringcat(&["sii", "build", &acme, "--type", "AD09", "--out", &image]);
-    assert!(unknown.code == Some(2) && unknown.all().contains("there is no such device"), "{}", unknown.all());
+    assert!(
+        unknown.code == Some(2) && unknown.all().contains("there is no such device: type \"AD09\""),
+        "{}",
+        unknown.all()
+    );
     let odd =
         place.write("odd.xml", &fs::read_to_string(&acme).unwrap().replacen("<Su Frame", "<Su Foo=\"1\" Frame", 1));
     let noted = ringcat(&["sii", "build", &odd, "--type", "AD08", "--out", &image]);
@@ -369,4 +384,22 @@ fn a_network_that_an_eni_cannot_express_is_refused_with_the_reason_and_no_file()
     assert!(!std::path::Path::new(&out).exists());
     let json = ringcat(&["--json", "eni", "export", "--network", &network]);
     assert!(json.code == Some(2) && json.verdict().contains("name a file with --out"), "{}", json.all());
+}
+
+// covers: eni-run
+#[test]
+fn settings_that_an_eni_does_not_hold_are_listed_once_for_all_subdevices() {
+    let place = Place::new("left-out");
+    let devices = "[[device]]\ntype = \"digital-output-8\"\ncount = 30\n";
+    let bus = place.write("bus.toml", &format!("[segment]\n{devices}"));
+    let out = place.path("machine.toml");
+    let made = ringcat(&["init", "--sim", &bus, "--out", &out]);
+    assert_eq!(made.code, Some(0), "{}", made.all());
+    let exported = ringcat(&["eni", "export", "--network", &out, "--out", &place.path("machine.xml")]);
+    assert_eq!(exported.code, Some(0), "{}", exported.all());
+    let all = exported.all();
+    let lines: Vec<&str> = all.lines().filter(|line| line.contains("not in the ENI: ")).collect();
+    assert_eq!(lines.len(), 1, "{all}");
+    // The name of the first one is its order code.
+    assert!(lines[0].contains("29 SubDevices (1, 2, 3, 4, 5, 6, 7, 8, ...): order_code: "), "{all}");
 }
