@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use ringcat::network::LoadedNetwork;
 use ringcat::{
-    ClockConfig, Declaration, DomainId, Entry, EntryPlace, ReferenceClock, RegisterError, Required, SubDeviceConfig,
-    SubDeviceId, SubDeviceInfo,
+    ClockConfig, Declaration, DomainId, Entry, EntryPlace, PulseGrid, ReferenceClock, RegisterError, Required,
+    SubDeviceConfig, SubDeviceId, SubDeviceInfo,
 };
 
 use crate::code::{Code, Outcome, report};
@@ -209,16 +209,14 @@ impl Draft {
         }
         // Those with SYNC signals may come later.
         if self.has_clock() || declaration.subdevices.iter().any(|config| config.sync.is_some()) {
-            let reference = match self.reference {
-                None => ReferenceClock::FirstWithClock,
-                Some(index) => ReferenceClock::Declared(SubDeviceId(index)),
+            let mut clocks = match declaration.clocks.take() {
+                // Windows and limits of a network file; the rest is that of ecrt.h.
+                Some(of_file) => of_file.with_pulse_grid(PulseGrid::FirstApplicationTime),
+                None => ClockConfig::default().as_igh().with_reference(ReferenceClock::FirstWithClock),
             };
-            let reference = match (&declaration.clocks, self.reference) {
-                (Some(of_file), None) => of_file.reference,
-                _ => reference,
-            };
-            let of_file = declaration.clocks.take();
-            let clocks = of_file.unwrap_or_else(|| ClockConfig::default().as_igh()).with_reference(reference);
+            if let Some(index) = self.reference {
+                clocks = clocks.with_reference(ReferenceClock::Declared(SubDeviceId(index)));
+            }
             declaration.clocks = Some(clocks.with_drift_distributions(0));
         }
         declaration
