@@ -17,7 +17,7 @@ const MACHINE: &str = include_str!("../../../ringcat/examples/machine.eni.xml");
 const STATES: [AlState; 5] = [AlState::Init, AlState::PreOp, AlState::Boot, AlState::SafeOp, AlState::Op];
 
 /// The example, the test file, and the real files, if they are there.
-fn files() -> Vec<(String, String)> {
+pub fn files() -> Vec<(String, String)> {
     let mut files = vec![("small".to_owned(), SMALL.to_owned()), ("machine".to_owned(), MACHINE.to_owned())];
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/eni");
     let Ok(entries) = fs::read_dir(&path) else {

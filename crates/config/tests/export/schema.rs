@@ -6,7 +6,7 @@ use std::path::Path;
 use ringcat_config::{ExportOptions, LrwUse};
 use roxmltree::Node;
 
-use crate::{CELL, SMALL, again, network};
+use crate::{CELL, SMALL, again, network, round_trips};
 
 const ECAT: &str = "Transition* BeforeSlave? Comment? Requires? Cmd Adp? Ado? Addr? Data? DataLength? Cnt? Retries? \
                     Validate? Timeout?";
@@ -123,8 +123,14 @@ fn exported_files_have_the_elements_of_the_format_in_their_order() {
         options.lrw = lrw;
         let of_network = network(CELL).to_eni(&options).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(faults(&of_network.text), Vec::<String>::new(), "{lrw:?}");
-        let of_eni = again(SMALL, &options).unwrap_or_else(|error| panic!("{error}"));
-        assert_eq!(faults(&of_eni.text), Vec::<String>::new(), "{lrw:?}");
+        for (name, text) in round_trips::files() {
+            let of_eni = again(&text, &options).unwrap_or_else(|error| panic!("{name}: {error}"));
+            // A sample that leaves its mailboxes to the EEPROM has an export that does so too.
+            let leaves_mailboxes = name == "synthetic_soem_sample.xml";
+            let is_known = |fault: &String| leaves_mailboxes && fault.starts_with("Mailbox: Send is missing in ");
+            let faults: Vec<String> = faults(&of_eni.text).into_iter().filter(|fault| !is_known(fault)).collect();
+            assert_eq!(faults, Vec::<String>::new(), "{name}: {lrw:?}");
+        }
     }
 }
 
