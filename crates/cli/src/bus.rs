@@ -9,16 +9,16 @@ use ringcat::simulated::SimulatedSegment;
 use ringcat::text::{Names, describe};
 use ringcat::{AlState, Event, Links, MainDevice, Options, Scan, SubDeviceInfo};
 
+use crate::descriptions::detected;
 use crate::failure::Failure;
 use crate::interfaces::{InterfaceArguments, LinkNames, SourceAddress};
+use crate::oddities::SiiOddities;
 use crate::output::warn;
 use crate::surroundings::Surroundings;
 use crate::thread::ThreadArguments;
 
 /// Object with the version of the firmware (protocol 6.3, ETG.1000.6).
 const FIRMWARE: u16 = 0x100A;
-/// Object with the idents of the modules that a device has detected (protocol ES-69).
-const MODULES: u16 = 0xF050;
 
 /// Where the network is.
 #[derive(Args, Clone, Debug)]
@@ -52,6 +52,8 @@ pub struct Bus {
     pub firmware: Vec<Option<String>>,
     /// Idents of the modules in the slots of each SubDevice, where they were read.
     pub modules: Vec<Vec<u32>>,
+    /// Faults of the SIIs, which are to be printed.
+    pub oddities: SiiOddities,
 }
 
 /// What is read of a SubDevice besides the scan.
@@ -102,10 +104,16 @@ fn scan<L: Links>(
     options: &Options,
     ring: bool,
     mut wanted: impl FnMut(&SubDeviceInfo) -> Wanted,
-    on_event: impl FnMut(&ringcat::TimedEvent),
+    mut on_event: impl FnMut(&ringcat::TimedEvent),
 ) -> Result<Bus, Failure> {
     let mut main_device = MainDevice::request(links, options);
-    let scan = main_device.scan_with(on_event)?;
+    let mut oddities = SiiOddities::default();
+    let scan = main_device.scan_with(|event| {
+        if !oddities.keep(event) {
+            on_event(event);
+        }
+    });
+    let scan = scan.inspect_err(|_| oddities.print(&[]))?;
     let (mut firmware, mut modules) = (Vec::new(), Vec::new());
     for info in &scan.subdevices {
         let has_objects = info.protocols.coe() && info.mailbox.is_some();
@@ -114,12 +122,12 @@ fn scan<L: Links>(
         firmware.push(version);
         modules.push(idents);
     }
-    Ok(Bus { scan, ring, firmware, modules })
+    Ok(Bus { scan, ring, firmware, modules, oddities })
 }
 
-/// Version of the firmware and idents of modules; a SubDevice that does not answer is reported. Without a list of its
-/// modules a device has none to read.
-fn read_besides<L: Links>(
+/// Version of the firmware and idents of modules, read in PREOP; it is in INIT afterwards. A SubDevice that does not
+/// answer is reported.
+pub fn read_besides<L: Links>(
     main_device: &mut MainDevice<L>,
     info: &SubDeviceInfo,
     wanted: Wanted,
@@ -130,10 +138,16 @@ fn read_besides<L: Links>(
     let position = info.position;
     let read = main_device.subdevice(position).request_state(AlState::PreOp).map(|()| {
         let firmware = wanted.firmware.then(|| main_device.subdevice(position).sdo_read::<String>(FIRMWARE, 0));
-        let count = wanted.modules.then(|| main_device.subdevice(position).sdo_read::<u8>(MODULES, 0).ok());
-        let slots = 1..=count.flatten().unwrap_or(0);
-        let ident = |slot| main_device.subdevice(position).sdo_read::<u32>(MODULES, slot).ok();
-        (firmware.and_then(|read| read.map_err(warn).ok()), slots.map_while(ident).collect())
+        let firmware = firmware.and_then(|read| read.map_err(warn).ok());
+        if !wanted.modules {
+            return (firmware, Vec::new());
+        }
+        let modules = detected(
+            main_device,
+            |main_device, index| main_device.subdevice(position).sdo_read(index, 0).ok(),
+            |main_device, index, slot| main_device.subdevice(position).sdo_read(index, slot).ok(),
+        );
+        (firmware, modules)
     });
     if let Err(error) = main_device.subdevice(position).request_state(AlState::Init) {
         warn(error);

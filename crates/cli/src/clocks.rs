@@ -21,7 +21,7 @@ use ringcat::{
 
 use crate::access::{Access, AccessArguments, WireLinks};
 use crate::clock_options::{ClockOptions, farthest};
-use crate::descriptions::{EsiArgument, complete};
+use crate::descriptions::{EsiArgument, complete_by};
 use crate::ending::EndRequest;
 use crate::failure::Failure;
 use crate::interfaces::now;
@@ -94,7 +94,7 @@ pub fn run(arguments: &ClocksArguments) -> Result<Report, Failure> {
         Some(scan) => scan,
         None => supervisor.scan().map_err(|error| surroundings.explain(error, supervisor.counters().foreign))?,
     };
-    let objects = complete(descriptions.as_mut(), &mut scan.subdevices, &[])?;
+    let objects = complete_by(&supervisor, descriptions.as_mut(), &mut scan.subdevices)?;
     let names = Names(scan.subdevices.iter().map(|info| info.name.clone()).collect());
     let mut declaration = automatic(&scan.subdevices, arguments.cycle);
     arguments.options.declare(&mut declaration, &scan.subdevices)?;

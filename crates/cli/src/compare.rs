@@ -61,9 +61,10 @@ pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
         stated.iter().filter(|it| !it.firmware.is_empty()).filter_map(|it| it.device).collect();
     let mut bus = arguments.bus.scan(|info| Wanted {
         firmware: with_firmware.contains(&(info.identity.vendor_id, info.identity.product_code)),
-        modules: descriptions.as_mut().is_some_and(|it| it.has_slots(info)),
+        modules: descriptions.as_mut().is_some_and(|it| it.has_modules(info)),
     })?;
     let described = complete(descriptions.as_mut(), &mut bus.scan.subdevices, &bus.modules)?;
+    bus.oddities.print(&described);
     let found = &bus.scan.subdevices;
     let network = FoundNetwork { subdevices: found, topology: &bus.scan.topology, firmware: &bus.firmware };
     let mut differences = configuration.differences(network, &stated);

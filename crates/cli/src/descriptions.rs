@@ -5,16 +5,18 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use clap::Args;
-use ringcat::SubDeviceInfo;
 use ringcat::config::ObjectNames;
 use ringcat::config::esi::{Device, Esi, PlacedModule, detected_modules};
 use ringcat::esi::EsiFolder;
+use ringcat::{Position, SubDeviceInfo, SupervisorThread};
 
 use crate::failure::Failure;
 use crate::output::{counted, warn};
 
 /// Language of the names: English.
 pub const LANGUAGE: u32 = 1033;
+/// Object with the idents of the modules that a device has detected (protocol ES-69).
+const MODULES: u16 = 0xF050;
 /// Positions without a description that a warning lists.
 const LISTED: usize = 8;
 
@@ -51,9 +53,65 @@ pub fn complete(
     found: &mut [SubDeviceInfo],
     idents: &[Vec<u32>],
 ) -> Result<Vec<ObjectNames>, Failure> {
+    let (names, missing) = found_and_described(descriptions, found, idents)?;
+    if !missing.is_empty() {
+        let more = if missing.len() > LISTED { ", ..." } else { "" };
+        let count = counted(missing.len(), "SubDevice", "SubDevices");
+        let first: Vec<String> = missing.iter().take(LISTED).map(Position::to_string).collect();
+        warn(format!("no description of {count}: position {}{more}", first.join(", ")));
+    }
+    Ok(names)
+}
+
+/// As [`complete`], with the modules that the SubDevices detect; those with slots are in PREOP afterwards.
+pub fn complete_by(
+    supervisor: &SupervisorThread,
+    mut descriptions: Option<&mut Descriptions>,
+    found: &mut [SubDeviceInfo],
+) -> Result<Vec<ObjectNames>, Failure> {
+    let mut idents = Vec::new();
+    if let Some(descriptions) = &mut descriptions {
+        idents.extend(found.iter().map(|info| match descriptions.has_modules(info) {
+            true => detected(
+                &mut supervisor.subdevice(info.position),
+                |subdevice, index| subdevice.sdo_read(index, 0).ok(),
+                |subdevice, index, slot| subdevice.sdo_read(index, slot).ok(),
+            ),
+            false => Vec::new(),
+        }));
+    }
+    complete(descriptions, found, &idents)
+}
+
+/// Idents of the modules that a device detects, after the list in its dictionary, of which `count` reads the length of
+/// an object and `ident` an entry. Without a list there are none.
+pub fn detected<D>(
+    device: &mut D,
+    count: impl Fn(&mut D, u16) -> Option<u8>,
+    ident: impl Fn(&mut D, u16, u8) -> Option<u32>,
+) -> Vec<u32> {
+    let slots = 1..=count(device, MODULES).unwrap_or(0);
+    slots.map_while(|slot| ident(device, MODULES, slot)).collect()
+}
+
+/// As [`complete`], without a report of what has no description.
+pub fn objects(
+    descriptions: Option<&mut Descriptions>,
+    found: &mut [SubDeviceInfo],
+    idents: &[Vec<u32>],
+) -> Result<Vec<ObjectNames>, Failure> {
+    found_and_described(descriptions, found, idents).map(|(names, _)| names)
+}
+
+/// Names of objects, and the positions of what has no description.
+fn found_and_described(
+    descriptions: Option<&mut Descriptions>,
+    found: &mut [SubDeviceInfo],
+    idents: &[Vec<u32>],
+) -> Result<(Vec<ObjectNames>, Vec<Position>), Failure> {
     match descriptions {
         Some(descriptions) => descriptions.complete(found, idents),
-        None => Ok(found.iter().map(own).collect()),
+        None => Ok((found.iter().map(own).collect(), Vec::new())),
     }
 }
 
@@ -114,8 +172,12 @@ impl Descriptions {
         Ok(at.map(|at| Described { esi, at, path }))
     }
 
-    /// Whether a SubDevice has slots for modules.
-    pub fn has_slots(&mut self, info: &SubDeviceInfo) -> bool {
+    /// Whether a SubDevice has slots for modules, and objects in which it can list them.
+    pub fn has_modules(&mut self, info: &SubDeviceInfo) -> bool {
+        info.protocols.coe() && info.mailbox.is_some() && self.has_slots(info)
+    }
+
+    fn has_slots(&mut self, info: &SubDeviceInfo) -> bool {
         self.of(info).is_ok_and(|described| described.is_some_and(|described| described.device().slots.is_some()))
     }
 
@@ -129,7 +191,11 @@ impl Descriptions {
     }
 
     /// The same, and the names of all objects.
-    fn complete(&mut self, found: &mut [SubDeviceInfo], idents: &[Vec<u32>]) -> Result<Vec<ObjectNames>, Failure> {
+    fn complete(
+        &mut self,
+        found: &mut [SubDeviceInfo],
+        idents: &[Vec<u32>],
+    ) -> Result<(Vec<ObjectNames>, Vec<Position>), Failure> {
         self.name_subdevices(found);
         let (mut all, mut missing) = (Vec::with_capacity(found.len()), Vec::new());
         let mut known: Vec<(Kind, Arc<ObjectNames>)> = Vec::new();
@@ -151,17 +217,11 @@ impl Descriptions {
                     };
                     names.share(shared);
                 }
-                None => missing.push(info.position.to_string()),
+                None => missing.push(info.position),
             }
             all.push(names);
         }
-        if !missing.is_empty() {
-            let more = if missing.len() > LISTED { ", ..." } else { "" };
-            let count = counted(missing.len(), "SubDevice", "SubDevices");
-            missing.truncate(LISTED);
-            warn(format!("no description of {count}: position {}{more}", missing.join(", ")));
-        }
-        Ok(all)
+        Ok((all, missing))
     }
 }
 

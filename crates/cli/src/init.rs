@@ -14,7 +14,7 @@ use ringcat::network::{NetworkFile, ScanOptions};
 use crate::bus::{Bus, BusArguments, Wanted};
 use crate::clock_options::sync::{Sync, choose, sync};
 use crate::clock_options::{SYNC_HELP, SYNC_LONG_HELP};
-use crate::descriptions::{Descriptions, EsiArgument};
+use crate::descriptions::{Descriptions, EsiArgument, objects};
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::network::Init;
@@ -107,12 +107,11 @@ pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
     let begin = Instant::now();
     let mut bus = arguments.bus.scan(|info| Wanted {
         firmware: arguments.firmware,
-        modules: descriptions.as_mut().is_some_and(|it| it.has_slots(info)),
+        modules: descriptions.as_mut().is_some_and(|it| it.has_modules(info)),
     })?;
     let scanned = Instant::now();
-    if let Some(descriptions) = &mut descriptions {
-        descriptions.name_subdevices(&mut bus.scan.subdevices);
-    }
+    let objects = objects(descriptions.as_mut(), &mut bus.scan.subdevices, &bus.modules)?;
+    bus.oddities.print(&objects);
     let mut options = ScanOptions::new(&arguments.name, arguments.cycle);
     options.ring = bus.ring;
     options.clocks = arguments.clocks || !arguments.sync.is_empty();

@@ -18,6 +18,7 @@ mod init;
 mod interfaces;
 mod json;
 mod numbers;
+mod oddities;
 mod others;
 mod output;
 mod recording;

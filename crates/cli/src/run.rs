@@ -25,12 +25,12 @@ use ringcat::config::ObjectNames;
 use ringcat::event_log::EventLog;
 use ringcat::text::{Names, address_of_sender, describe};
 use ringcat::{
-    Application, CyclicThread, Declaration, Ended, Event, Instant, JobProbe, JunctionConnection, JunctionMode,
-    LastOutputs, Links, Options, ProcessData, Scan, SubDeviceId, SupervisorThread, SyncSignals,
+    ActivateError, Application, CyclicThread, Declaration, Ended, Error, Event, Instant, JobProbe, JunctionConnection,
+    JunctionMode, LastOutputs, Links, Options, ProcessData, Scan, SubDeviceId, SupervisorThread, SyncSignals,
 };
 
 use crate::access::{Access, WireLinks};
-use crate::descriptions::complete;
+use crate::descriptions::complete_by;
 use crate::ending::EndRequest;
 use crate::failure::Failure;
 use crate::interfaces::{LinkNames, now};
@@ -72,7 +72,7 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
         Some(scan) => scan,
         None => scan(&supervisor, &mut cyclic, &mut surroundings, begin)?,
     };
-    let described = complete(descriptions.as_mut(), &mut scan.subdevices, &[])?;
+    let described = complete_by(&supervisor, descriptions.as_mut(), &mut scan.subdevices)?;
     let (names, objects) = names(network.as_ref(), &scan, described);
     let declaration = arguments.declared.declare(network.as_ref(), &scan.subdevices)?;
     let declaration = arguments.resend.adapt(declaration.with_under_way(arguments.under_way.under_way));
@@ -84,7 +84,7 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
     let (domains, clocks) = (declaration.domains.len(), declaration.clocks.is_some());
     let signals: Vec<Option<SyncSignals>> = declaration.subdevices.iter().map(|config| config.sync).collect();
     say!("{} SubDevices; cycle {} us", scan.subdevices.len(), period.as_micros());
-    let application = activate(arguments, network.as_ref(), supervisor, declaration, cyclic)?;
+    let application = activate(arguments, network.as_ref(), &objects, supervisor, declaration, cyclic)?;
     let (cycles, watched, sent_once, jobs) = start_cycles(arguments, network.as_ref(), application, &names, &end)?;
     let ring = interfaces.links.redundant.is_some();
     let events = EventLog::new(begin, names).with_every_event(arguments.all_events);
@@ -166,7 +166,6 @@ fn scan(
     result.map_err(|error| surroundings.explain(error, others + supervisor.counters().foreign))
 }
 
-/// Activates what is declared, with the connections of junctions and what makes cycles begin.
 /// Names of the declared SubDevices, and of their objects.
 fn names(network: Option<&ConfiguredNetwork>, scan: &Scan, described: Vec<ObjectNames>) -> (Names, Vec<ObjectNames>) {
     match network {
@@ -175,15 +174,17 @@ fn names(network: Option<&ConfiguredNetwork>, scan: &Scan, described: Vec<Object
     }
 }
 
+/// Activates what is declared, with the connections of junctions and what makes cycles begin.
 fn activate(
     arguments: &RunArguments,
     network: Option<&ConfiguredNetwork>,
+    objects: &[ObjectNames],
     supervisor: SupervisorThread,
     declaration: Declaration,
     cyclic: WireLinks,
 ) -> Result<Recorded, Failure> {
     let trigger = arguments.declared.trigger(&declaration);
-    supervisor.load(declaration)?;
+    supervisor.load(declaration).map_err(|error| explain(error, network, objects))?;
     let at_station = |station| network.and_then(|network| network.at_station(station));
     for connection in &arguments.junction.connections {
         let connection = connection.resolve(at_station).map_err(Failure::new)?;
@@ -192,14 +193,28 @@ fn activate(
     for connection in junctions(arguments, network).into_iter().flat_map(|(_, connections)| connections) {
         supervisor.add_junction_connection(connection)?;
     }
-    let mut application = supervisor.apply(cyclic).map_err(|error| match network {
-        Some(network) => network.explain(error.into()),
-        None => Failure::from(ringcat::Error::from(error)),
-    })?;
+    let refused = |error: Box<ringcat::Refused<_>>| explain(error.into(), network, objects);
+    let mut application = supervisor.apply(cyclic).map_err(refused)?;
     if let Some(trigger) = trigger {
         application.set_trigger(trigger);
     }
     Ok(application)
+}
+
+/// Why nothing was activated, with the names of the objects that the reason mentions.
+fn explain(error: Error, network: Option<&ConfiguredNetwork>, objects: &[ObjectNames]) -> Failure {
+    let of = match &error {
+        Error::Activate(ActivateError::Setup { subdevice, .. }) => objects.get(subdevice.0),
+        _ => None,
+    };
+    let failure = match network {
+        Some(network) => network.explain(error),
+        None => Failure::from(error),
+    };
+    match of {
+        Some(names) => Failure::new(names.annotate(&failure.to_string())),
+        None => failure,
+    }
 }
 
 /// The SubDevices of which not all process data is sent again with a lost frame, if lost frames are sent again at all;
@@ -311,4 +326,27 @@ fn report_others(links: &mut impl Links, surroundings: &mut Surroundings) -> u64
         }
     }) {}
     count
+}
+
+#[cfg(test)]
+mod tests {
+    use ringcat::config::network::model::{Pdo, SubDevice, SyncManager};
+    use ringcat::{SetupError, SubDeviceConfig, SubDeviceInfo, plan};
+
+    use super::*;
+
+    // covers: esi-use
+    #[test]
+    fn a_refused_activation_names_the_objects_of_its_subdevice() {
+        let mut info = SubDeviceInfo::default();
+        info.identity.vendor_id = 2;
+        let error = plan(&SubDeviceConfig::default().sdo(0x8000, 1, [1]), &info).unwrap_err();
+        let mut names = ObjectNames::default();
+        let pdo = Pdo { index: 0x8000, name: "Settings".to_owned(), ..Pdo::default() };
+        let sm = SyncManager { pdo: vec![pdo], ..SyncManager::default() };
+        names.add_declared(&SubDevice { sync_manager: vec![sm], ..SubDevice::default() });
+        let refused = ActivateError::Setup { subdevice: SubDeviceId(1), error: SetupError::Plan(error) };
+        let text = explain(Error::Activate(refused), None, &[ObjectNames::default(), names]).to_string();
+        assert!(text.contains("object 0x8000:01 \"Settings\" is to be written"), "{text}");
+    }
 }

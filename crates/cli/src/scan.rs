@@ -3,15 +3,18 @@
 mod pdos;
 
 use clap::Args;
+use ringcat::config::ObjectNames;
 use ringcat::text::{Names, describe};
-use ringcat::{Event, MainDevice, Scan};
+use ringcat::{Event, MainDevice, Scan, SubDeviceInfo};
 
 use crate::access::{Access, AccessArguments};
-use crate::descriptions::{Descriptions, EsiArgument, complete};
+use crate::bus::{Wanted, read_besides};
+use crate::descriptions::{Descriptions, EsiArgument, complete, complete_by};
 use crate::ending::EndRequest;
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::scan;
+use crate::oddities::SiiOddities;
 use crate::output::{counted, say, warn};
 use crate::surroundings::Surroundings;
 use crate::table;
@@ -43,7 +46,7 @@ pub struct ScanArguments {
 /// Scans and prints what was found; what happens meanwhile goes to the standard error output.
 pub fn run(arguments: &ScanArguments) -> Result<Report, Failure> {
     EndRequest::at_once()?;
-    let descriptions = arguments.esi.open()?;
+    let mut descriptions = arguments.esi.open()?;
     if arguments.access.master.is_some() {
         return known(arguments, descriptions);
     }
@@ -54,51 +57,64 @@ pub fn run(arguments: &ScanArguments) -> Result<Report, Failure> {
     let links = recording.tee(links);
     let _awake = thread.apply();
     let mut main_device = MainDevice::request(links, &interfaces.options());
+    let mut oddities = SiiOddities::default();
     let result = main_device.scan_with(|event| match &event.event {
         Event::ScanProgress { .. } | Event::ScanFailed { .. } => {}
+        _ if oddities.keep(event) => {}
         _ => match surroundings.note(&event.event) {
             None => eprintln!("{}", describe(event, &Names::default())),
             Some(words) => words.into_iter().for_each(warn),
         },
     });
     let foreign = main_device.acyclic_counters().foreign;
-    let scan = result.map_err(|error| surroundings.explain(error, foreign))?;
+    let mut scan = result.map_err(|error| {
+        oddities.print(&[]);
+        surroundings.explain(error, foreign)
+    })?;
     if foreign > 0 {
         eprintln!("{foreign} frames of another MainDevice arrived during the scan: {}", surroundings.senders());
     }
+    let wanted = Wanted { firmware: false, modules: true };
+    let mut modules = |info: &SubDeviceInfo| match descriptions.as_mut().is_some_and(|it| it.has_modules(info)) {
+        true => read_besides(&mut main_device, info, wanted).1,
+        false => Vec::new(),
+    };
+    let idents: Vec<Vec<u32>> = scan.subdevices.iter().map(&mut modules).collect();
     drop(main_device);
-    let data = show(arguments.pdos, descriptions, scan)?;
+    let objects = complete(descriptions.as_mut(), &mut scan.subdevices, &idents)?;
+    oddities.print(&objects);
+    let data = show(arguments.pdos, &objects, &scan);
     let verdict = Verdict::Held(counted(data.subdevices.len(), "SubDevice", "SubDevices")).and(recording.finish());
     Ok(Report { verdict, data: Data::Scan(data) })
 }
 
-/// Prints what was found, with the names of descriptions.
-fn show(with_pdos: bool, mut descriptions: Option<Descriptions>, mut scan: Scan) -> Result<scan::Scan, Failure> {
-    let objects = complete(descriptions.as_mut(), &mut scan.subdevices, &[])?;
-    let mut json = table::json(&scan);
-    for line in table::lines(&scan) {
+/// Prints what was found, with the names of its objects.
+fn show(with_pdos: bool, objects: &[ObjectNames], scan: &Scan) -> scan::Scan {
+    let mut json = table::json(scan);
+    for line in table::lines(scan) {
         say!("{line}");
     }
     if with_pdos {
-        for ((info, names), json) in scan.subdevices.iter().zip(&objects).zip(&mut json.subdevices) {
+        for ((info, names), json) in scan.subdevices.iter().zip(objects).zip(&mut json.subdevices) {
             let pdos = pdos::json(info, names);
             pdos::lines(info, &pdos).iter().for_each(|line| say!("{line}"));
             json.pdos = Some(pdos);
         }
     }
-    Ok(json)
+    json
 }
 
 /// What a daemon knows of the bus of a master. Nothing is scanned: a daemon does that after each change.
-fn known(arguments: &ScanArguments, descriptions: Option<Descriptions>) -> Result<Report, Failure> {
+fn known(arguments: &ScanArguments, mut descriptions: Option<Descriptions>) -> Result<Report, Failure> {
     let access = &arguments.access;
     let Access { supervisor, cyclic, recording, tenure, .. } = access.begin(&access.interfaces.options())?;
-    let scan = match tenure.scan() {
+    let mut scan = match tenure.scan() {
         Some(scan) => scan,
         None => supervisor.scan()?,
     };
+    let objects = complete_by(&supervisor, descriptions.as_mut(), &mut scan.subdevices)?;
     drop(cyclic);
-    let data = show(arguments.pdos, descriptions, scan)?;
+    let data = show(arguments.pdos, &objects, &scan);
     let verdict = Verdict::Held(counted(data.subdevices.len(), "SubDevice", "SubDevices"));
     let verdict = verdict.and(tenure.end()).and(recording.finish());
     Ok(Report { verdict, data: Data::Scan(data) })

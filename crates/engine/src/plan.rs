@@ -76,7 +76,9 @@ fn plan_inner(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDevic
     };
     check::check(info, &mailbox, &process_data)?;
     let supported = check::SupportedProtocols::new(config, info, !mailbox.is_empty());
-    config.startup.iter().try_for_each(|command| check::command(supported, command))?;
+    let sizes = check::MailboxSizes::new(&mailbox, &bootstrap);
+    let possible = |command| check::command(supported, command).and_then(|()| sizes.holds(command));
+    config.startup.iter().try_for_each(possible)?;
     let used = |index: &u8| {
         mailbox.iter().any(|sm| sm.index == *index) || process_data.iter().any(|area| area.sync_manager == *index)
     };

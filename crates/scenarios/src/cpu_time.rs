@@ -1,6 +1,7 @@
 //! CPU time of this process, as the kernel charges it: user and system.
 
 use std::fs;
+use std::hint::black_box;
 use std::time::Duration;
 
 /// Linux counts in hundredths of a second here, whatever the kernel's own clock (`USER_HZ`).
@@ -13,6 +14,29 @@ const TICK: Duration = Duration::from_millis(10);
 pub fn process_cpu_time() -> Duration {
     let stat = fs::read_to_string("/proc/self/stat").expect("Linux has /proc/self/stat");
     ticks(&stat).map_or_else(|| panic!("/proc/self/stat is odd: {stat}"), |ticks| TICK * ticks)
+}
+
+/// Parts of a second that [`reference_work`] took on the machine on which the bars were set, without other programs.
+pub const REFERENCE: Duration = Duration::from_millis(250);
+/// Words that [`reference_work`] changes: 8 MiB, about what the simulator of a thousand SubDevices touches.
+const REFERENCE_WORDS: usize = 1 << 20;
+const REFERENCE_STEPS: u64 = 50_000_000;
+
+/// CPU time of a fixed work that computes and reads memory. A busy or slow machine charges more for it, as it does for
+/// what is measured beside it: the ratio of both is a figure of the program.
+pub fn reference_work() -> Duration {
+    let mut words = vec![1_u64; REFERENCE_WORDS];
+    let begin = process_cpu_time();
+    let mut state = 0x9E37_79B9_7F4A_7C15_u64;
+    for _ in 0..REFERENCE_STEPS {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        let word = &mut words[(state >> 44) as usize % REFERENCE_WORDS];
+        *word = word.wrapping_add(state);
+    }
+    black_box(&words);
+    process_cpu_time() - begin
 }
 
 /// `utime` and `stime`, fields 14 and 15. The name before them, field 2, is in parentheses and may contain any

@@ -3,13 +3,16 @@
 
 use alloc::vec::Vec;
 
+use ringcat_wire::mailbox::Header;
+use ringcat_wire::mailbox::foe::FoeMessage;
 use ringcat_wire::register::{SyncManager, SyncManagerDirection};
 
 use super::areas::{PROCESS_RAM, occupied};
 use super::error::PlanProblem;
 use super::subdevice::{AreaPlan, SmPlan};
 use crate::config::{
-    IdnRead, IdnWrite, MailMessage, SdoDownload, SdoUpload, StartupAction, StartupCommand, SubDeviceConfig, Transition,
+    FileRead, FileWrite, IdnRead, IdnWrite, MailMessage, SdoDownload, SdoUpload, StartupAction, StartupCommand,
+    SubDeviceConfig, Transition,
 };
 use crate::info::SubDeviceInfo;
 use crate::order::InOrder;
@@ -113,6 +116,40 @@ pub(super) fn command(supported: SupportedProtocols, command: &StartupCommand) -
         | StartupAction::FileRead(_)
         | StartupAction::Ip(_)
         | StartupAction::Register(_) => Ok(()),
+    }
+}
+
+/// Bytes of the mailboxes that the SubDevice reads, in PREOP and above, and in BOOT.
+#[derive(Clone, Copy)]
+pub(super) struct MailboxSizes {
+    standard: Option<u16>,
+    bootstrap: Option<u16>,
+}
+
+impl MailboxSizes {
+    pub(super) fn new(mailbox: &[SmPlan], bootstrap: &[SmPlan]) -> MailboxSizes {
+        let written = |pair: &[SmPlan]| pair.first().map(|sm| sm.register.length);
+        MailboxSizes { standard: written(mailbox), bootstrap: written(bootstrap) }
+    }
+
+    /// Whether the message of a command, or the request with the name of a file, fits its mailbox.
+    pub(super) fn holds(self, command: &StartupCommand) -> Result<(), PlanProblem> {
+        let message = match &command.action {
+            StartupAction::FileWrite(FileWrite { name, .. }) | StartupAction::FileRead(FileRead { name, .. }) => {
+                FoeMessage::OVERHEAD + name.len()
+            }
+            StartupAction::Mail(MailMessage::Aoe(data) | MailMessage::Voe(data)) => data.len(),
+            _ => return Ok(()),
+        };
+        let mailbox = match command.transition {
+            Transition::Ib | Transition::Bi => self.bootstrap,
+            _ => self.standard,
+        };
+        let bytes = Header::LEN + message;
+        match mailbox {
+            Some(mailbox) if bytes > usize::from(mailbox) => Err(PlanProblem::MailTooLong { bytes, mailbox }),
+            _ => Ok(()),
+        }
     }
 }
 

@@ -175,6 +175,13 @@ pub enum PlanProblem {
     NoProtocol(&'static str),
     /// A message without the header of its protocol, or an answer.
     Message,
+    /// A message of a start-up command that its mailbox cannot hold. It counts with the headers of mailbox and protocol.
+    MailTooLong {
+        /// Bytes of the message.
+        bytes: usize,
+        /// Bytes of the mailbox that the SubDevice reads.
+        mailbox: u16,
+    },
     /// A mailbox command at the transition from INIT to INIT.
     NoMailInInit,
     /// A configuration file declares a SyncManager twice.
@@ -295,6 +302,9 @@ impl fmt::Display for PlanProblem {
             }
             Self::NoCoe { .. } | Self::NoSoe { .. } | Self::NoEoe => self.fmt_protocol(f),
             Self::NoProtocol(_) | Self::Message | Self::NoMailInInit => self.fmt_protocol(f),
+            Self::MailTooLong { bytes, mailbox } => {
+                write!(f, "a start-up command has a message of {bytes} bytes, the mailbox has {mailbox}")
+            }
             Self::DeclaredTwice { sync_manager } => write!(f, "SM {sync_manager} is declared twice"),
             Self::DeclaredMailboxes { out, inward } => {
                 write!(f, "expected a mailbox to the SubDevice and one from it, or none, got {out} and {inward}")

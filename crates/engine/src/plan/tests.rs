@@ -11,7 +11,7 @@ use ringcat_wire::register::Information;
 use ringcat_wire::sii::{CoeDetails, GeneralFlags, MailboxLayout, MailboxProtocols, Sii, SiiHeader, SiiSyncManager};
 
 use super::*;
-use crate::config::{PdoEntry, PdoMapping, Watchdog};
+use crate::config::{FileRead, PdoEntry, PdoMapping, StartupAction, StartupCommand, Transition, Watchdog};
 use crate::info::{InfoWarning, PdoEntryInfo, PdoInfo, PdoSource, Readout, SiiProblem};
 
 /// An ET1100: 8 FMMUs, 8 SyncManagers, 8 KiB, four MII ports, DC.
@@ -372,6 +372,26 @@ fn an_sdo_needs_coe() {
     let config = any().sdo(0x8000, 1, [1]);
     assert!(plan(&config, &device()).is_ok());
     assert_eq!(problem(&config, &terminal()), PlanProblem::NoCoe { index: 0x8000, sub_index: 1 });
+}
+
+#[test]
+fn a_message_of_a_start_up_command_fits_the_mailbox_of_its_state() {
+    let layout = MailboxLayout { receive_offset: 0x1000, receive_size: 0x40, send_offset: 0x1200, send_size: 0x40 };
+    let protocols = MailboxProtocols(MailboxProtocols::FOE | MailboxProtocols::AOE);
+    let info = SubDeviceInfo { bootstrap: Some(layout), protocols, ..device() };
+    // The headers of mailbox and FoE have 6 bytes each, the mailboxes 128 and in BOOT 64.
+    let file = |transition, length: usize| {
+        let read = StartupAction::FileRead(FileRead::new("n".repeat(length)));
+        SubDeviceConfig { startup: vec![StartupCommand::new(transition, read)], ..any() }
+    };
+    for (transition, mailbox) in [(Transition::Ip, 128), (Transition::Ib, 64)] {
+        let most = usize::from(mailbox) - 12;
+        assert!(plan(&file(transition, most), &info).is_ok(), "{transition:?}");
+        let expected = PlanProblem::MailTooLong { bytes: usize::from(mailbox) + 1, mailbox };
+        assert_eq!(problem(&file(transition, most + 1), &info), expected);
+    }
+    let text = PlanProblem::MailTooLong { bytes: 129, mailbox: 128 }.to_string();
+    assert_eq!(text, "a start-up command has a message of 129 bytes, the mailbox has 128");
 }
 
 #[test]
