@@ -64,9 +64,27 @@ impl ScaledTime {
             Some(factor) => i64::from(cycle_ns) / -i64::from(factor),
         }
     }
+
+    /// The part of the cycle that the factor gives, and the time besides.
+    fn sum_in_cycle_ns(self, cycle_ns: u32) -> i64 {
+        match self.factor {
+            None | Some(0) => self.ns.into(),
+            Some(_) => self.in_cycle_ns(cycle_ns) + i64::from(self.ns),
+        }
+    }
 }
 
 impl OpMode {
+    /// Shift of SYNC0 in nanoseconds for a bus cycle: the part of the cycle and the time are added (protocol ES-63).
+    pub fn sync0_shift_ns(&self, bus_cycle_ns: u32) -> i64 {
+        self.shift_0.sum_in_cycle_ns(bus_cycle_ns)
+    }
+
+    /// Shift of SYNC1 against SYNC0, as [`Self::sync0_shift_ns`].
+    pub fn sync1_shift_ns(&self, bus_cycle_ns: u32) -> i64 {
+        self.shift_1.sum_in_cycle_ns(bus_cycle_ns)
+    }
+
     /// Cycle of SYNC0 in nanoseconds for a bus cycle.
     pub fn sync0_cycle_ns(&self, bus_cycle_ns: u32) -> i64 {
         self.cycle_0.in_cycle_ns(bus_cycle_ns)

@@ -35,6 +35,10 @@ pub fn select<'a>(esi: &'a Esi, device: &'a Device, choices: &'a Choices) -> Res
         let text = format!("its housing has a further SubDevice, product code {product:#010x}: declare it, too");
         work.note(device.line, text);
     }
+    for other in &device.alternatives {
+        let revision = other.revision.map_or(String::new(), |revision| format!(" revision {revision:#010x}"));
+        work.note(device.line, format!("AlternativeType{revision}: declare it by its own description"));
+    }
     let sync_managers = assignment::sync_managers(&mut work)?;
     let commands = commands::commands(&mut work)?;
     let Work { modules, mode, notices, .. } = work;

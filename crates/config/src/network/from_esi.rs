@@ -66,6 +66,10 @@ impl SubDevice {
             selection.sync_managers.iter().filter(|of| described(of)).map(|of| sync_manager(of, language)).collect();
         if let Some(mode) = selection.mode {
             clock(selection, mode, cycle, &mut subdevice)?;
+            clock_notices(device, mode, &mut subdevice, &mut from);
+        }
+        if device.use_lrd_lwr {
+            from.note("UseLrdLwr: its EEPROM decides whether it is in an LRW".into());
         }
         for command in &selection.commands {
             subdevice.startup.extend(startup(command, &mut from));
@@ -271,9 +275,9 @@ fn clock(selection: &Selection<'_>, mode: &OpMode, cycle: Duration, into: &mut S
     };
     let cycle_of = |ns: i64| if ns == 0 { i64::from(bus) } else { ns };
     let sync0 = cycle_of(mode.sync0_cycle_ns(bus));
-    let shift0 = mode.shift_0.in_cycle_ns(bus);
+    let shift0 = mode.sync0_shift_ns(bus);
     let (sync1, shift1) = match has_sync1 {
-        true => (mode.sync1_cycle_ns(bus), mode.shift_1.in_cycle_ns(bus)),
+        true => (mode.sync1_cycle_ns(bus), mode.sync1_shift_ns(bus)),
         false => (0, 0),
     };
     let limit = i64::from(i32::MAX);
@@ -297,6 +301,29 @@ fn clock(selection: &Selection<'_>, mode: &OpMode, cycle: Duration, into: &mut S
         sync1_shift: Shift(shift1),
     });
     Ok(())
+}
+
+/// What a network file does not hold of the settings of clocks (protocol ES-63, ES-63a). A device of which SYNC registers
+/// are not written gets no signals.
+fn clock_notices(device: &Device, mode: &OpMode, into: &mut SubDevice, from: &mut Notes) {
+    let Some(clock) = &device.clock else { return };
+    if clock.time_loop_only && into.sync.take().is_some() {
+        from.note("TimeLoopControlOnly: SYNC registers are not written, no signals are declared".into());
+    }
+    if clock.is_32_bit {
+        from.note("Unknown64Bit: the registers of its clock decide whether it has 32 or 64 bits".into());
+    }
+    if clock.external_reference {
+        from.note("ExternalRefClock: choose the reference clock by `reference` of the table `clocks`".into());
+    }
+    let Some(sync) = &into.sync else { return };
+    if mode.shift_0_for_inputs && sync.sync0_shift.0 != 0 {
+        let (mode, shift) = (mode.name.trim(), sync.sync0_shift.0);
+        from.note(format!(
+            "operation mode \"{mode}\": the shift of SYNC0 of {shift} ns refers to inputs, it is counted from the begin of \
+             the cycle"
+        ));
+    }
 }
 
 /// A start-up command; `None` if it cannot be sent, with a notice.

@@ -43,7 +43,12 @@ const ADDED: [(&str, &str, &str, &str); 24] = [
         "",
     ),
     ("2011-08", "<ProfileNo>5001", "<DiagMessages><DiagMessage/></DiagMessages><ProfileNo>5001", ""),
-    ("2013-03", "<ShiftTimeSync0>", "<ShiftTimeSync0 InputDelayTime=\"1\" OutputDelayTime=\"2\">", ""),
+    (
+        "2013-03",
+        "<ShiftTimeSync0>",
+        "<ShiftTimeSync0 InputDelayTime=\"1\" OutputDelayTime=\"2\">",
+        "ShiftTimeSync0@InputDelayTime is not used",
+    ),
     ("2013-03", "<Category><CatNo>2", "<Category PreserveOnlineData=\"1\"><CatNo>2", ""),
     ("2013-03", "<Name>Channels 1 to 4</Name>", "<Name>Channels 1 to 4</Name><ExcludedSm>1</ExcludedSm>", ""),
     ("2013-03", "<Slot MinInstances=\"1\"", "<SlotSelections/><Slot MinInstances=\"1\"", ""),

@@ -77,6 +77,41 @@ fn without_choices_the_assignment_is_that_of_the_file() {
     assert_eq!(declared(&esi, DRIVE, &german).name, "AM01");
 }
 
+// covers: esi-declare, ES-63, ES-63a
+#[test]
+fn a_shift_adds_time_and_part_of_the_cycle_and_lost_settings_of_clocks_are_told() {
+    let from = |text: &str| {
+        let esi = acme_of(text);
+        let choices = choices(|choices| choices.mode = Some("DC".to_owned()));
+        let selection = select(&esi, &esi.devices[DRIVE], &choices).unwrap_or_else(|error| panic!("{error}"));
+        let from = SubDevice::from_esi(&selection, CYCLE, 1033).unwrap_or_else(|error| panic!("{error}"));
+        let notices: Vec<String> = from.notices.iter().map(|notice| notice.text.clone()).collect();
+        (from.subdevice.sync.map(|sync| sync.sync0_shift.0), notices)
+    };
+    let shift = |attributes: &str, ns: i32| {
+        let text = format!("<ShiftTimeSync0{attributes}>{ns}<");
+        from(&ACME.replacen("<ShiftTimeSync0>30000<", &text, 1))
+    };
+    let (_, plain) = shift("", 30_000);
+    let added = |notices: &[String]| notices.iter().filter(|text| !plain.contains(text)).cloned().collect::<Vec<_>>();
+    for (attributes, ns, expected) in [("", -20_000, -20_000), (" Factor=\"1\"", -20_000, 980_000)] {
+        let (found, notices) = shift(attributes, ns);
+        assert_eq!((found, added(&notices).len()), (Some(expected), 0), "{attributes}");
+    }
+    let (found, notices) = shift(" Factor=\"-4\" Input=\"1\"", 1_000);
+    assert_eq!((found, added(&notices).len()), (Some(251_000), 1));
+    assert!(added(&notices)[0].contains("the shift of SYNC0 of 251000 ns refers to inputs"), "{notices:?}");
+    let (found, notices) = from(&ACME.replacen("<Dc>", "<Dc TimeLoopControlOnly=\"1\">", 1));
+    assert_eq!((found, added(&notices).len()), (None, 1), "{notices:?}");
+    let (_, notices) = from(&ACME.replacen("<Dc>", "<Dc Unknown64Bit=\"1\" ExternalRefClock=\"true\">", 1));
+    assert_eq!(added(&notices).len(), 2, "{notices:?}");
+    let other = "<AlternativeType RevisionNo=\"#x00640001\">AM01-0100</AlternativeType><Name>AM01 Modular";
+    let (_, notices) = from(&ACME.replacen("<Name>AM01 Modular", other, 1));
+    assert!(added(&notices)[0].starts_with("AlternativeType revision 0x00640001: "), "{notices:?}");
+    let lrw = ACME.replace("<Type ProductCode", "<Type UseLrdLwr=\"1\" ProductCode");
+    assert!(added(&from(&lrw).1)[0].starts_with("UseLrdLwr: "));
+}
+
 // covers: esi-declare, ES-47, ES-50
 #[test]
 fn pdos_are_chosen_by_the_rules_of_the_file() {

@@ -42,6 +42,27 @@ attach = "AK10-1.2"
 modules = ["csp axis", "status axis", "0x00010001"]
 "#;
 
+/// Parameters of synchronisation, for the dictionary of the analog terminal.
+const SYNCHRONISATION: &str = "<Object><Index>#x1C33</Index><Name>SM input parameter</Name><Type>UINT</Type>\
+    <BitSize>16</BitSize><Info><DefaultData>2200</DefaultData></Info><Flags><Access>rw</Access></Flags></Object>";
+
+// covers: esi-use
+#[test]
+fn parameters_of_synchronisation_are_those_of_the_description() {
+    let text = fs::read_to_string(Path::new(ACME).join("acme.xml")).unwrap();
+    let object = "<Object><Index>#x8010</Index>";
+    let folder = std::env::temp_dir().join(format!("ringcat-esi-synchronisation-{}", std::process::id()));
+    fs::create_dir_all(&folder).unwrap();
+    let text = text.replacen(object, &format!("{SYNCHRONISATION}{object}"), 1);
+    fs::write(folder.join("acme.xml"), text).unwrap();
+    let segment = "[[device]]\nesi = \"acme.xml\"\ntype = \"AA02\"\n";
+    let links = links(segment, &folder).unwrap();
+    fs::remove_dir_all(&folder).unwrap();
+    let mut main_device = MainDevice::request(links, &Options::default());
+    main_device.scan().unwrap();
+    assert_eq!(main_device.subdevice(Position(0)).sdo_read::<u16>(0x1C33, 0).unwrap(), 0x22);
+}
+
 // covers: esi-use, ES-33, ES-38, ES-48, ES-64, ES-67, ES-69, ES-75
 #[test]
 fn a_segment_of_described_devices_reaches_op_with_dictionary_and_modules() {

@@ -95,7 +95,7 @@ pub(super) const KINDS: &[(&str, &str, &str)] = &[
          ShiftTimeSync3! Sm=ModeSm VendorSpecific*",
     ),
     ("Word", "", ""),
-    ("Time", "Factor Input OutputDelayTime InputDelayTime", ""),
+    ("Time", "Factor Input OutputDelayTime! InputDelayTime!", ""),
     ("ModeSm", "No", "SyncType CycleTime=Time ShiftTime=ModeShift Pdo=ModePdo"),
     ("ModeShift", "Factor MinAfterSync MinBeforeFrame", ""),
     ("ModePdo", "OSFac", ""),
