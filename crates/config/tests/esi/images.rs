@@ -109,6 +109,19 @@ fn a_drive_has_mailboxes_clock_modes_and_a_category_of_its_vendor() {
     assert_eq!(fields, ["clock mode 1: factor of SYNC1"]);
 }
 
+// covers: ES-82
+#[test]
+fn a_category_of_the_device_precedes_the_standard_ones_of_twincat_only() {
+    let own = OUTPUTS.replace("</ByteSize>", "</ByteSize><Category><CatNo>3</CatNo><Data>0100</Data></Category>");
+    let codes = |profile: SiiProfile| {
+        let image = built(&own, |options| options.profile = profile);
+        let sii = Sii::parse(&image).unwrap();
+        sii.categories().map(|it| it.kind.code()).collect::<Vec<_>>()
+    };
+    assert_eq!(codes(SiiProfile::TwinCat)[..2], [3, 10]);
+    assert_eq!(codes(SiiProfile::Siitool).last(), Some(&3));
+}
+
 // covers: ES-84, ES-85, ES-96
 #[test]
 fn an_image_that_does_not_fit_is_refused_unless_the_pdos_are_left_out() {

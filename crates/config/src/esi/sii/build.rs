@@ -29,6 +29,9 @@ pub struct SiiImage {
     pub notices: Vec<String>,
 }
 
+/// The category of a device that TwinCAT writes before the standard ones.
+const DEVICE_SPECIFIC: u16 = 3;
+
 /// The image of a device.
 ///
 /// # Errors
@@ -62,6 +65,10 @@ pub fn build(esi: &Esi, device: &Device, options: &SiiOptions) -> Result<SiiImag
     let size = eeprom.byte_size.map_or(USUAL_BYTES, |size| size as usize);
     let mut bytes = header(device, eeprom, size, options, &mut notices).encode().to_vec();
     categories.insert(0, (STRINGS, strings.bytes()));
+    if options.profile == SiiProfile::TwinCat {
+        // A category of the device precedes the standard ones (protocol ES-82); the others keep their order.
+        categories.sort_by_key(|(code, _)| *code != DEVICE_SPECIFIC);
+    }
     for (code, data) in categories.into_iter().filter(|(_, data)| !data.is_empty()) {
         let words = u16::try_from(data.len().div_ceil(2))
             .map_err(|_| rule(device.line, format!("category {code} has {} bytes", data.len())))?;
