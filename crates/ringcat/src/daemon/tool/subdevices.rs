@@ -27,7 +27,7 @@ const WRITTEN: u8 = 0x04;
 
 /// SubDevices from a position on, with their AL states.
 pub(super) fn list(supervisor: &SupervisorThread, from: u16) -> Result<Piece<SubDeviceLine>, Error> {
-    let (total, stations, mut these) = supervisor.with(move |engine| known(engine, from))?;
+    let (total, stations, mut these) = supervisor.act(move |engine| known(engine, from))?;
     if these.is_empty() {
         return Ok(Piece { total, these });
     }
