@@ -5,8 +5,6 @@
 //! The library runs the engine: an application that also calls its functions for frames and orders (`receive`, `poll`,
 //! `transmit`, `take_link_order`) takes frames and orders away from the library.
 
-use std::future::Future;
-
 use ringcat_engine::main_device::MainDevice as Engine;
 
 use crate::acyclic::Inline;

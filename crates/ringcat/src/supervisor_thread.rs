@@ -11,7 +11,6 @@ mod joining;
 mod looking;
 mod worker;
 
-use std::future::Future;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -202,6 +201,7 @@ impl SupervisorThread {
 
     /// Starts an async function of the engine in the thread: `make` gets the engine, and may take mailboxes from it.
     /// SubDevices are named by their index in the declaration, before activation by their position.
+    #[cfg(any(feature = "daemon", feature = "engine"))]
     pub(crate) fn start_procedure<T, W>(&self, make: impl FnOnce(&mut Engine) -> W + Send + 'static) -> Job<T>
     where
         T: Send + 'static,

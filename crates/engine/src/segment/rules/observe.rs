@@ -37,8 +37,7 @@ impl Segment {
     fn take(&mut self, seen: Observation<'_>, now: Instant, effects: &mut Effects) {
         use Observation::*;
         match seen {
-            Words(words) if self.is_active() => self.observe_words(&words, now, effects),
-            Words(words) => self.observe_idle_words(&words, now, effects),
+            Words(words) => self.observe_words(&words, now, effects),
             Link(seen) => self.link_control.observe(seen, effects),
             Idle(seen) => self.observe_idle(seen, now, effects),
             PartOfRound { versions: v, readings: r, others: o, counted: c } => self.observe_part(v, r, o, c),
@@ -128,6 +127,9 @@ impl Segment {
     }
 
     fn observe_words(&mut self, words: &Words, now: Instant, effects: &mut Effects) {
+        if !self.is_active() {
+            return self.observe_idle_words(words, now, effects);
+        }
         self.words.before.observe(words, self.board.clocks.holds(), &self.clocks);
         if !self.choices.supervision {
             return;

@@ -72,7 +72,7 @@ impl Segment {
         self.board.set_taking_part(index, exchanges);
     }
 
-    /// Another MainDevice controls the bus: attempts have ended, and what was altered for a moment is its matter now.
+    /// Another MainDevice controls the bus: attempts have ended, and it restores what was altered for a moment.
     fn yield_bus(&mut self) {
         self.slot = self.slot.emptied();
         self.altered.clear();

@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use super::Words;
+use super::posted::Words;
 use crate::time::Instant;
 
 /// The last result with an answer.

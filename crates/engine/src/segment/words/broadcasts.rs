@@ -2,7 +2,7 @@
 
 use ringcat_wire::register::EcatEvent;
 
-use super::{Words, counts_of};
+use super::posted::{Words, counts_of};
 use crate::ring_status::LinkCounts;
 
 /// What a broadcast has shown.

@@ -1,6 +1,6 @@
 //! Since the words before: changes of the segment, counted for the procedures that wait for one.
 
-use super::Words;
+use super::posted::{Words, counts_of};
 use crate::board::Board;
 use crate::ring_status::LinkCounts;
 use crate::segment::clocks::Clocks;
@@ -39,7 +39,7 @@ pub struct SinceBefore {
 impl SinceBefore {
     /// The segment is now as the clocks were measured, or could not be: words are compared with those posted now.
     pub fn begin(&mut self, board: &Board) {
-        let answering = board.supervision().map(|(_, result)| super::counts_of(&result)).unwrap_or_default();
+        let answering = board.supervision().map(|(_, result)| counts_of(&result)).unwrap_or_default();
         self.shown = Shown { ring: board.ring().changes, answering, holds: board.clocks.holds() };
         self.has_answered = answering != LinkCounts::default();
     }

@@ -1,6 +1,6 @@
 //! While the ring does not change: how many SubDevices answer. After a change: on which link, once that is certain.
 
-use super::{Words, counts_of};
+use super::posted::{Words, counts_of};
 use crate::link::Link;
 use crate::ring::RingState;
 use crate::ring_status::LinkCounts;

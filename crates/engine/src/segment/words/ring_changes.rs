@@ -1,6 +1,6 @@
 //! Since the ring was processed last: whether it has changed, and the direction in which frames are lost.
 
-use super::Words;
+use super::posted::Words;
 use crate::link::Link;
 
 /// The ring as it was processed last.

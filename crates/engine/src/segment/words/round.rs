@@ -2,7 +2,7 @@
 
 use ringcat_wire::register::EcatEvent;
 
-use super::Words;
+use super::posted::Words;
 use crate::board::{RingWord, Supervision};
 
 /// A supervision result with a number this much higher than that at the end of a round was certainly sent after the

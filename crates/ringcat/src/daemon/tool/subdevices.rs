@@ -110,7 +110,7 @@ fn identity(info: &SubDeviceInfo) -> [u32; 4] {
     [identity.vendor_id, identity.product_code, identity.revision, identity.serial]
 }
 
-/// The MainDevice writes a SyncManager: by its type, and by its control byte where the type does not tell.
+/// The MainDevice writes a SyncManager: by its type, and by its control byte where the type is not enough.
 fn is_output(kind: SyncManagerKind, control: u8) -> bool {
     match kind {
         SyncManagerKind::Outputs | SyncManagerKind::MailboxOut => true,
