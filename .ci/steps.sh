@@ -129,7 +129,7 @@ lints() {
 features() {
     local feature features=("" standby)
     if [[ ${#full[@]} != 0 ]]; then
-        features+=(packet sim eni network esi gateway eoe daemon serde tracing)
+        features+=(packet sim eni network esi gateway eoe daemon serde tracing engine)
         echo "the program without standby"
         cargo clippy --package ringcat-cli --no-default-features --all-targets -- -D warnings
     fi

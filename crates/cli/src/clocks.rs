@@ -200,7 +200,7 @@ impl Watch<'_> {
                 Shown::Warning(words) => warn(words),
             });
             let supervisor = cycles.supervisor();
-            let (locked, clocks) = supervisor.with(|engine| (engine.clocks_locked(), engine.clocks()))?;
+            let (locked, clocks) = (supervisor.clocks_locked()?, supervisor.clocks()?);
             course.note(now().since(self.begin), &clocks);
             if (locked && ends_with_lock && supervisor.all_settled()) || now() >= until || self.end.is_asked() {
                 return Ok(locked);

@@ -1,16 +1,16 @@
-//! `ringcat doctor`: what on this machine would hurt a MainDevice, why, and what mends it.
+//! `ringcat doctor`: settings of this machine that disturb a MainDevice, why, and the command that corrects each.
 //!
-//! It looks and measures; it changes nothing. Every look gives a [`Finding`]: bad, minor, unknown or good. A look that
-//! is not possible is unknown, never a guess. docs/doctor.md explains each.
+//! It checks and measures; it changes nothing. Every check gives a [`Finding`]: bad, minor, unknown or good. A check
+//! that is not possible is unknown, never a guess. docs/doctor.md explains each.
 
 mod finding;
 mod foreign;
+mod inspect;
 mod interface;
 mod kernel;
 mod latency;
 mod limits;
 mod loader_cache;
-mod look;
 mod picture;
 mod processor_list;
 mod processors;
@@ -32,16 +32,16 @@ use crate::output::{counted, say};
 use crate::svg::Picture;
 use crate::verdict::{Report, Verdict};
 use finding::{Finding, Level};
+use inspect::{Inspect, Machine};
 use latency::Latency;
-use look::{Look, Machine};
 
 /// Options of `ringcat doctor`.
 #[derive(Args, Debug)]
 pub struct DoctorArguments {
-    /// Network interface of the main link, to look at it too
+    /// Network interface of the main link, to check it too
     #[arg(long, value_name = "IF", help_heading = "Links")]
     main: Option<String>,
-    /// Network interface at the other end of a ring, to look at it too
+    /// Network interface at the other end of a ring, to check it too
     #[arg(long, value_name = "IF", requires = "main", help_heading = "Links")]
     redundant: Option<String>,
     /// Measure for so long how late a thread wakes up; 0 leaves it out
@@ -86,12 +86,12 @@ impl DoctorArguments {
     }
 }
 
-/// Looks and measures. It has held where nothing is bad.
+/// Checks and measures. The verdict is good if no finding is bad.
 pub fn run(arguments: &DoctorArguments) -> Result<Report, Failure> {
     arguments.check()?;
     let lasts = Duration::from_secs(u64::from(arguments.latency));
     let end = EndRequest::watch(Some(arguments.priority))?;
-    let mut findings = look_at(&Machine, &arguments.names())?;
+    let mut findings = check_all(&Machine, &arguments.names())?;
     // An unwritable file shows before the measurement.
     let picture = arguments.svg.as_ref().map(|path| Picture::create(path)).transpose()?;
     let latency = match arguments.latency {
@@ -112,19 +112,19 @@ pub fn run(arguments: &DoctorArguments) -> Result<Report, Failure> {
     Ok(Report { verdict: verdict(&findings, reasons), data: Data::Doctor(json(&findings, latency.as_ref())) })
 }
 
-/// All looks at a machine and the interfaces of a segment.
-fn look_at(machine: &dyn Look, names: &[&str]) -> Result<Vec<Finding>, Failure> {
+/// All checks of a machine and the interfaces of a segment.
+fn check_all(machine: &dyn Inspect, names: &[&str]) -> Result<Vec<Finding>, Failure> {
     let mut findings = Vec::new();
     for name in names {
         let Some(interface) = machine.interface(name) else {
             return Err(ringcat_link::interface::missing(name).into());
         };
-        findings.extend(interface::look(machine, &interface));
+        findings.extend(interface::checks(machine, &interface));
     }
-    findings.extend(kernel::look(machine));
-    findings.extend(processors::look(machine, names));
-    findings.extend(limits::look(machine));
-    findings.extend(foreign::look(machine));
+    findings.extend(kernel::checks(machine));
+    findings.extend(processors::checks(machine, names));
+    findings.extend(limits::checks(machine));
+    findings.extend(foreign::checks(machine));
     Ok(findings)
 }
 

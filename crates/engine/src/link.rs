@@ -63,6 +63,15 @@ impl LinkSet {
     }
 }
 
+/// An order to the link layer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct LinkOrder {
+    /// The link.
+    pub link: Link,
+    /// Disconnect it; otherwise reconnect it.
+    pub disconnect: bool,
+}
+
 impl core::fmt::Display for Link {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {

@@ -101,7 +101,7 @@ pub use crate::segment::clocks::{ClockStatus, HiddenDelay};
 
 use crate::event::{CyclicEvent, EventLog, EventsSince, TimedEvent};
 use crate::knowledge::KnownMailbox;
-use crate::link::{Link, LinkSet};
+use crate::link::{Link, LinkOrder, LinkSet};
 use crate::mail::eoe::EthernetPort;
 use crate::mail::relay::GatewayQueue;
 use crate::mail::{EmergencyRings, InUse};
@@ -120,7 +120,7 @@ use crate::ring::Identity;
 use crate::ring_status::{CableReport, LinkStatus, Redundancy, RingStatus};
 use crate::role::RoleControl;
 use crate::segment::member::Phase;
-use crate::segment::{Choices, Observation, Segment, counts};
+use crate::segment::{Choices, LinkObservation, Observation, Segment, counts};
 use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor, UnderWay};
 use crate::time::Instant;
 use loaded::Loaded;
@@ -165,8 +165,6 @@ pub struct MainDevice {
     gateway_queue: Option<GatewayQueue>,
     /// The objects that a gateway client reads at address 0.
     own_objects: OwnObjects,
-    /// A link that was taken down by command.
-    disconnected: Option<Link>,
     /// Mailboxes that were in use when the role became INACTIVE.
     left_mailboxes: Vec<(InUse, KnownMailbox)>,
     /// Its role.
@@ -210,7 +208,6 @@ impl MainDevice {
             ports: BTreeMap::new(),
             gateway_queue: None,
             own_objects: OwnObjects::default(),
-            disconnected: None,
             left_mailboxes: Vec::new(),
             roles,
             role_followed: 0,
@@ -253,8 +250,6 @@ impl MainDevice {
         self.number_cyclic_events(now);
         let events = self.supervisor.take_events().end_session();
         self.renew_supervisor(events, now);
-        // The procedure that would have enabled it again has ended.
-        self.supervisor.order_link(self.disconnected.take());
         self.segment = self.segment.without_application(&self.supervisor.bus());
         self.segment.observe(Observation::Deactivated);
         self.start_reconciler();
@@ -373,17 +368,18 @@ impl MainDevice {
         self.supervisor.transmit(now, budget, transmit)
     }
 
-    /// Command to the link layer; see [`Supervisor::take_link_order`].
+    /// Order to the link layer: a link, and whether to disconnect it. Answer it with
+    /// [`MainDevice::answer_link_order`].
+    #[inline]
     pub fn take_link_order(&mut self) -> Option<(Link, bool)> {
-        let order = self.supervisor.take_link_order()?;
-        let (link, disconnect) = order;
-        self.disconnected = disconnect.then_some(link);
-        Some(order)
+        let LinkOrder { link, disconnect } = self.supervisor.take_link_order()?;
+        self.segment.observe(Observation::Link(LinkObservation::Fetched));
+        Some((link, disconnect))
     }
 
-    /// Result of that command; see [`Supervisor::answer_link_order`].
+    /// Whether that order was carried out.
     pub fn answer_link_order(&mut self, done: bool) {
-        self.supervisor.answer_link_order(done);
+        self.segment.observe(Observation::Link(LinkObservation::Answered(done)));
     }
 
     /// Whether acyclic datagrams wait to be sent.

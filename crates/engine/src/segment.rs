@@ -15,7 +15,6 @@ mod attention;
 mod breaks;
 mod cable_watch;
 mod cabling;
-mod changes;
 mod choices;
 pub mod clocks;
 mod crossings;
@@ -28,6 +27,7 @@ mod hot_connect;
 mod idle;
 mod key;
 mod knowledge;
+mod link_order;
 mod local_rings;
 mod matching;
 pub mod member;
@@ -56,18 +56,18 @@ mod undeclared;
 mod versions;
 pub mod view;
 mod wake;
+mod words;
 
 pub use addressed::Addressed;
 pub use ascent::longest_ascent;
 pub use cabling::{Cabling, stations_by_position};
-pub use changes::Changes;
 pub use choices::{Choices, ReadPdos, Retries};
 pub use crossings::{Crossing, LineCheck, PORT_BITS, is_swapped};
 pub use given::Given;
 pub use hot_connect::counts;
 pub use idle::{Change, Differences, IdleObservation};
 pub use key::SubDeviceKey;
-
+pub use link_order::LinkObservation;
 pub use local_rings::is_down;
 pub use model::{Declared, Segment};
 #[cfg(feature = "standby")]
@@ -77,7 +77,6 @@ pub use owners::Owners;
 pub use pdo_finding::PdoFinding;
 pub use port_control::BlockedPort;
 pub use reading::Reading;
-pub use ring::Words;
 pub use round_result::RoundResult;
 pub use scan::{Found, Scan};
 pub use seen::Seen;
@@ -85,6 +84,7 @@ pub use subdevice::SubDevice;
 pub use subdevices::SubDevices;
 pub use undeclared::{AttemptFailure, KeptState, ShownState, StateRead, UndeclaredObservation, UpkeepProgress};
 pub use versions::Versions;
+pub use words::{Changes, Words};
 
 #[cfg(test)]
 mod tests;

@@ -40,7 +40,7 @@ pub struct Onward {
     /// The link to send it on; the frame has the mark of this link.
     pub link: Link,
     /// The frame has the identity of this MainDevice, which has sent none for long: another MainDevice has the same
-    /// bytes 3 to 5 in its address, and neither can tell its frames from those of the other (protocol SM-09).
+    /// bytes 3 to 5 in its address, and neither can distinguish its frames from those of the other (protocol SM-09).
     pub has_own_identity: bool,
 }
 

@@ -13,7 +13,6 @@ mod executor;
 mod flight;
 mod flights;
 mod group;
-mod link_order;
 mod outbox;
 mod posted;
 mod received;
@@ -48,11 +47,10 @@ pub use signal::Signal;
 use crate::bell::Bell;
 use crate::board::Board;
 use crate::event::{Event, EventLog, EventsSince, TimedEvent};
-use crate::link::{Link, LinkSet};
+use crate::link::{Link, LinkOrder, LinkSet};
 use crate::ring::{Class, Classified, Identity, RingMonitor, RingState, Sequence};
 use crate::role::{MainDeviceRole, RoleControl};
 use crate::time::Instant;
-use link_order::LinkOrder;
 use shared::Shared;
 use shared_cell::SharedCell;
 
@@ -187,31 +185,9 @@ impl Supervisor {
         self.shared.due_at()
     }
 
-    /// Request of a procedure to the link layer: a link, and whether to disconnect it. Answer it with
-    /// [`Supervisor::answer_link_order`].
-    pub fn take_link_order(&mut self) -> Option<(Link, bool)> {
-        let shared = &mut *self.shared.borrow_mut();
-        let LinkOrder::Given { link, disconnect } = shared.link_order else { return None };
-        shared.link_order = LinkOrder::Fetched;
-        Some((link, disconnect))
-    }
-
-    /// Requests the reconnection of a link that was taken down for a procedure of another supervisor.
-    pub(crate) fn order_link(&mut self, disconnected: Option<Link>) {
-        if let Some(link) = disconnected {
-            self.shared.borrow_mut().link_order = LinkOrder::Given { link, disconnect: false };
-        }
-    }
-
-    /// Reports whether an order was carried out.
-    pub fn answer_link_order(&mut self, done: bool) {
-        let shared = &mut *self.shared.borrow_mut();
-        if shared.link_order == LinkOrder::Fetched {
-            shared.link_order = LinkOrder::Answered(done);
-            if let Some(task) = shared.awaits_link.take() {
-                shared.wake(task);
-            }
-        }
+    /// The order to the link layer that waits for the runtime.
+    pub(crate) fn take_link_order(&mut self) -> Option<LinkOrder> {
+        self.shared.borrow_mut().link_order.take()
     }
 
     /// Whether datagrams of procedures wait to be sent.

@@ -86,7 +86,7 @@ const WAITS: [(&str, &[Reason]); 42] = [
 ];
 
 /// By file, each wait for an event with a limit (`Bus::within`), in its order. In a loop the limit is a period.
-const WITHIN: [(&str, &[Reason]); 18] = [
+const WITHIN: [(&str, &[Reason]); 17] = [
     ("mail/conversation.rs", &[Limit, Limit, Limit]),
     ("mail/mailbox.rs", &[Limit]),
     ("mail/reader.rs", &[Register]),
@@ -103,9 +103,8 @@ const WITHIN: [(&str, &[Reason]); 18] = [
     ("procedures/request_states.rs", &[Limit]),
     ("procedures/serve_requests.rs", &[Limit]),
     ("procedures/services/statistics.rs", &[Cyclic]),
-    ("procedures/shared_segment.rs", &[Limit]),
+    ("procedures/shared_segment.rs", &[Limit, Limit]),
     ("procedures/undeclared/keep.rs", &[Retry]),
-    ("supervisor", &[Limit]),
 ];
 
 #[test]

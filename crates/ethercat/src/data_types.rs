@@ -226,7 +226,7 @@ fn general(value: f64) -> String {
     if value.is_infinite() {
         return if value < 0.0 { "-inf" } else { "inf" }.to_owned();
     }
-    // Rounding may carry into another power of ten, so the rounded number tells it.
+    // Rounding may carry into another power of ten, so the exponent is that of the rounded number.
     let scientific = format!("{value:.*e}", DIGITS as usize - 1);
     let (digits, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
     let exponent: i32 = exponent.parse().unwrap_or(0);
@@ -347,7 +347,7 @@ mod tests {
                 let value = bits.to_le_bytes()[..data_type.bytes].to_vec();
                 let text = data_type.show(&value).expect("it has the size");
                 let text = String::from_utf8(text).expect("it is text");
-                // Six digits do not tell a whole float; negative zero has no number.
+                // Six digits do not identify every float; negative zero has no number.
                 let is_exact = !matches!(data_type.kind, Kind::Float) && data_type.is_number();
                 let is_zero = data_type.kind == Kind::SignMagnitude && data_type.sign_magnitude(bits) == 0;
                 let is_bool = data_type.kind == Kind::Bool && value[0] > 1;

@@ -52,7 +52,7 @@ pub fn run(arguments: &[OsString], socket: &Path, output: &mut dyn Write, errors
     match try_run(arguments, socket, output, errors) {
         Ok(()) => true,
         Err(failure) => {
-            // Where the standard error is closed nothing can be said.
+            // Nothing can be reported where the standard error is closed.
             let _ = errors.write_all(failure.text().as_bytes());
             false
         }

@@ -12,7 +12,7 @@ fn main() -> ExitCode {
     let is_good = ethercat::run(&arguments, &ethercat::session::socket(), &mut output, &mut errors);
     let written = output.flush().map_err(Failure::from);
     if let (true, Err(failure)) = (is_good, &written) {
-        // Where the standard error is closed nothing can be said.
+        // Nothing can be reported where the standard error is closed.
         let _ = errors.write_all(failure.text().as_bytes());
     }
     if is_good && written.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE }

@@ -85,7 +85,7 @@ impl<'a> Session<'a> {
 
     /// Says something on the standard error.
     pub fn say(&mut self, text: &str) {
-        // Where it is closed nothing can be said.
+        // Nothing can be reported where it is closed.
         let _ = writeln!(self.errors, "{text}");
     }
 

@@ -226,7 +226,7 @@ impl Bus {
     /// # Errors
     /// [`Code::GONE`].
     pub fn found(&self) -> Outcome<Vec<SubDeviceInfo>> {
-        self.supervisor.with(|engine| engine.subdevices()).map_err(|_| Code::GONE)
+        self.supervisor.subdevices().map_err(|_| Code::GONE)
     }
 
     /// Where questions are answered.
@@ -243,7 +243,7 @@ impl Bus {
             let Ok(seen) = self.responder.overview() else { return };
             let (responding, found) = (seen.responding(), seen.found);
             let is_found = seen.is_scanned && found == u32::from(responding) && found > 0;
-            if is_found && !self.supervisor.with(|engine| engine.are_pdos_awaited()).unwrap_or(false) {
+            if is_found && !self.supervisor.are_pdos_awaited().unwrap_or(false) {
                 return;
             }
             let elapsed = begin.elapsed();

@@ -471,7 +471,7 @@ impl Master {
         self.check_reserved()?;
         let reference =
             index.map_or(ReferenceClock::FirstWithClock, |index| ReferenceClock::Declared(SubDeviceId(index)));
-        let chosen = self.bus()?.supervisor().with(move |engine| engine.choose_reference_clock(reference));
+        let chosen = self.bus()?.supervisor().choose_reference_clock(reference);
         chosen.map_err(|_| Code::GONE)?.map(|_| ()).ok_or(Code::NO_CLOCK)
     }
 

@@ -31,7 +31,7 @@ impl Peer {
     /// The peer of a connection.
     ///
     /// # Errors
-    /// The system does not tell it.
+    /// The system does not report it.
     pub fn of(stream: &UnixStream) -> io::Result<Peer> {
         let fd = stream.as_raw_fd();
         let mut own = libc::ucred { pid: 0, uid: u32::MAX, gid: u32::MAX };

@@ -20,9 +20,7 @@ use ringcat_engine::RingState;
 use ringcat_engine::domain::{DomainId, DomainStatus};
 use ringcat_engine::event::{Event, TimedEvent};
 use ringcat_engine::exchange::{CopyError, CopyRule, CyclicCounters, Entry, Exchange};
-use ringcat_engine::main_device::{
-    Active, Directory, LiveStatus, MainDevice as Engine, Pending, SubDeviceId, SubDeviceState,
-};
+use ringcat_engine::main_device::{Active, Directory, LiveStatus, Pending, SubDeviceId, SubDeviceState};
 use ringcat_engine::ring_status::RingStatus;
 use ringcat_engine::time::Instant;
 use ringcat_engine::{Class, class_of};
@@ -452,15 +450,5 @@ impl<L: Links> Application<L, Inline> {
     /// Number of events that were dropped because they were not taken in time.
     pub fn events_dropped(&self) -> u64 {
         self.acyclic.events_dropped()
-    }
-
-    /// The acyclic half, for functions without a method here.
-    pub fn engine(&self) -> &Engine {
-        &self.acyclic.engine
-    }
-
-    /// The acyclic half, for functions without a method here.
-    pub fn engine_mut(&mut self) -> &mut Engine {
-        &mut self.acyclic.engine
     }
 }

@@ -37,7 +37,7 @@ impl<L: Links> MainDevice<L> {
         mut self,
         declare: impl FnOnce(&Scan) -> Declaration,
     ) -> Result<Application<L>, Box<Refused<MainDevice<L>>>> {
-        let begun = self.engine_mut().start_scan_for_operation().map_err(Error::from);
+        let begun = self.engine.start_scan_for_operation().map_err(Error::from);
         match begun.and_then(|()| self.finish_scan(|_| ())) {
             Ok(scan) => self.activate(declare(&scan)),
             Err(error) => Err(Box::new(Refused { error, main_device: self })),
@@ -53,7 +53,7 @@ impl SupervisorThread {
     /// As [`SupervisorThread::scan`] and [`SupervisorThread::activate`]. The error contains the handle and the links
     /// for another attempt.
     pub fn bring_up<C: Links>(self, declare: impl FnOnce(&Scan) -> Declaration, links: C) -> Activated<C> {
-        let begun = self.with(Engine::start_scan_for_operation).and_then(|begun| Ok(begun?));
+        let begun = self.act(Engine::start_scan_for_operation).and_then(|begun| Ok(begun?));
         match begun.and_then(|()| self.finish_scan(|| ())) {
             Ok(scan) => self.activate(declare(&scan), links),
             Err(error) => Err(Box::new(Refused { error, main_device: Ended { supervisor: self, links } })),

@@ -53,6 +53,7 @@
 //! | `serde` | the types of `Snapshot` in any format of serde |
 //! | `standby` | one of two MainDevices in a ring, which forwards, follows and takes over ([`MainDevice::join`]) |
 //! | `tracing` | events and messages of the acyclic half for a `tracing` subscriber |
+//! | `engine` | the engine itself, for own procedures and runtimes; its functions may change with any version |
 //!
 //! Without these features an application implements [`Links`] itself.
 
@@ -65,6 +66,8 @@ pub mod cyclic_thread;
 #[cfg(feature = "daemon")]
 pub mod daemon;
 mod either_links;
+#[cfg(feature = "engine")]
+mod engine_access;
 #[cfg(feature = "eni")]
 pub mod eni;
 #[cfg(feature = "eoe")]
@@ -247,6 +250,7 @@ pub use ringcat_engine::layout::LayoutError;
 pub use ringcat_engine::mail::eoe::{EoeError, EoeFailure, EthernetCounters, EthernetRate, EthernetStatus};
 pub use ringcat_engine::mail::stream::{Overflow, Sink, Source};
 pub use ringcat_engine::mail::{Conversation, Lane, MailCounters, MailboxSizes};
+#[cfg(feature = "engine")]
 pub use ringcat_engine::main_device::MainDevice as Engine;
 pub use ringcat_engine::main_device::{AreaEntries, EthernetSubDevice, PlacedEntry};
 pub use ringcat_engine::{PdoPlan, PlanFault, PlanProblem, PlanWarning, SmPlan};

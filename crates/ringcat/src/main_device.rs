@@ -105,7 +105,7 @@ impl<L: Links> MainDevice<L> {
     /// Frames are lost repeatedly, no SubDevice answers, or SubDevices are added or lost meanwhile.
     pub fn inspect_ring(&mut self) -> Result<RingInspection, Error> {
         let bus = self.engine.bus();
-        Ok(self.run(inspect_ring(bus))?)
+        Ok(self.perform(inspect_ring(bus))?)
     }
 
     /// Receives frames, runs procedures, sends frames.
@@ -145,11 +145,6 @@ impl<L: Links> MainDevice<L> {
         self.links.now()
     }
 
-    /// The engine, for functions without a method here.
-    pub fn engine(&self) -> &Engine {
-        &self.engine
-    }
-
     /// Waits for a frame or a deadline.
     fn wait(&mut self) {
         if let Some(wake) = self.engine.next_deadline() {
@@ -158,14 +153,9 @@ impl<L: Links> MainDevice<L> {
     }
 
     /// Runs an async function of the engine to its end.
-    pub fn run<T: 'static>(&mut self, work: impl Future<Output = T> + 'static) -> T {
+    pub(crate) fn perform<T: 'static>(&mut self, work: impl Future<Output = T> + 'static) -> T {
         let work = self.engine.start(work);
         self.finish(work)
-    }
-
-    /// The engine, for functions without a method here.
-    pub fn engine_mut(&mut self) -> &mut Engine {
-        &mut self.engine
     }
 
     /// Waits for the result of a procedure. Nothing stops the engine meanwhile, so there always is a result.

@@ -292,7 +292,7 @@ impl Services for &SupervisorThread {
     }
 
     fn immediately<T: Send + 'static>(self, act: impl FnOnce(&mut Engine) -> T + Send + 'static) -> Result<T, Error> {
-        self.with(act)
+        self.act(act)
     }
 }
 
@@ -322,7 +322,7 @@ impl Services for Background<'_> {
     }
 
     fn immediately<T: Send + 'static>(self, act: impl FnOnce(&mut Engine) -> T + Send + 'static) -> Result<T, Error> {
-        self.0.with(act)
+        self.0.act(act)
     }
 }
 
@@ -337,12 +337,12 @@ impl<L: Links> Services for &mut MainDevice<L> {
         E: Send + 'static,
         Error: From<E>,
     {
-        let work = start(self.engine_mut());
+        let work = start(&mut self.engine);
         Ok(self.finish(work)?)
     }
 
     fn immediately<T: Send + 'static>(self, act: impl FnOnce(&mut Engine) -> T + Send + 'static) -> T {
-        act(self.engine_mut())
+        act(&mut self.engine)
     }
 }
 
@@ -360,10 +360,10 @@ impl<L: Links> Services for &mut Application<L, Inline> {
         E: Send + 'static,
         Error: From<E>,
     {
-        start(self.engine_mut())
+        start(&mut self.acyclic.engine)
     }
 
     fn immediately<T: Send + 'static>(self, act: impl FnOnce(&mut Engine) -> T + Send + 'static) -> T {
-        act(self.engine_mut())
+        act(&mut self.acyclic.engine)
     }
 }

@@ -70,7 +70,7 @@ impl<L: Links> Application<L, SupervisorThread> {
     /// # Errors
     /// SubDevices do not reach the state in time, or the bus fails.
     pub fn stop(mut self, outputs: LastOutputs, state: AlState, limit: Duration) -> Result<Ended<L>, Error> {
-        let is_allowed = self.acyclic.with(|engine| is_allowed(engine, Function::Stop))?;
+        let is_allowed = self.acyclic.act(|engine| is_allowed(engine, Function::Stop))?;
         self.end_cycles(outputs, is_allowed);
         self.acyclic.stop(state, limit)?;
         Ok(Ended { supervisor: self.acyclic, links: self.links })
@@ -83,7 +83,7 @@ impl<L: Links> Application<L, SupervisorThread> {
     /// SubDevices do not reach PREOP in time, or the bus fails. The error contains the handle and the links.
     pub fn deactivate(mut self, outputs: LastOutputs, limit: Duration) -> Deactivated<L> {
         // Without its thread there is nothing to go on with.
-        let ended = self.acyclic.with(|engine| is_allowed(engine, Function::Deactivate)).and_then(|is_allowed| {
+        let ended = self.acyclic.act(|engine| is_allowed(engine, Function::Deactivate)).and_then(|is_allowed| {
             self.end_cycles(outputs, is_allowed);
             self.acyclic.deactivate(limit)
         });

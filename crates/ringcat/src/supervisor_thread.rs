@@ -11,7 +11,6 @@ mod joining;
 mod looking;
 mod worker;
 
-use std::future::Future;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -192,27 +191,18 @@ impl SupervisorThread {
     ///
     /// # Errors
     /// The thread has ended.
-    pub fn with<R: Send + 'static>(&self, act: impl FnOnce(&mut Engine) -> R + Send + 'static) -> Result<R, Error> {
+    pub(crate) fn act<R: Send + 'static>(
+        &self,
+        act: impl FnOnce(&mut Engine) -> R + Send + 'static,
+    ) -> Result<R, Error> {
         let mut act = Some(act);
         self.ask(move |engine| act.take().map(|act| act(engine))).wait()
     }
 
-    /// Runs an async function of the engine in the thread and waits for its end: `make` gets the engine, and may take
-    /// mailboxes from it. SubDevices are named by their index in the declaration, before activation by their position.
-    ///
-    /// # Errors
-    /// The thread has ended, or the MainDevice was stopped meanwhile.
-    pub fn run<T, W>(&self, make: impl FnOnce(&mut Engine) -> W + Send + 'static) -> Result<T, Error>
-    where
-        T: Send + 'static,
-        W: Future<Output = T> + 'static,
-    {
-        self.start_job(make).wait()
-    }
-
-    /// Starts an async function of the engine in the thread; as [`SupervisorThread::run`], but does not wait for its
-    /// end.
-    pub fn start_job<T, W>(&self, make: impl FnOnce(&mut Engine) -> W + Send + 'static) -> Job<T>
+    /// Starts an async function of the engine in the thread: `make` gets the engine, and may take mailboxes from it.
+    /// SubDevices are named by their index in the declaration, before activation by their position.
+    #[cfg(any(feature = "daemon", feature = "engine"))]
+    pub(crate) fn start_procedure<T, W>(&self, make: impl FnOnce(&mut Engine) -> W + Send + 'static) -> Job<T>
     where
         T: Send + 'static,
         W: Future<Output = T> + 'static,
@@ -237,7 +227,7 @@ impl SupervisorThread {
     /// # Errors
     /// As [`SupervisorThread::scan`].
     pub fn scan_while(&self, meanwhile: impl FnMut()) -> Result<Scan, Error> {
-        self.with(Engine::start_scan)??;
+        self.act(Engine::start_scan)??;
         self.finish_scan(meanwhile)
     }
 
@@ -272,12 +262,12 @@ impl SupervisorThread {
     /// # Errors
     /// Errors in the declaration alone.
     pub fn load(&self, declaration: Declaration) -> Result<(), Error> {
-        Ok(self.with(move |engine| engine.load(declaration))??)
+        Ok(self.act(move |engine| engine.load(declaration))??)
     }
 
     /// Gives back the memory for the image of a domain after a failed activation ([`Declaration::place_image`]).
     pub fn unused_memory(&self, domain: DomainId) -> Option<&'static mut [u8]> {
-        self.with(move |engine| engine.unused_memory(domain)).ok().flatten()
+        self.act(move |engine| engine.unused_memory(domain)).ok().flatten()
     }
 
     /// Second step, as [`crate::MainDevice::add_junction_connection`].
@@ -285,7 +275,7 @@ impl SupervisorThread {
     /// # Errors
     /// Nothing is loaded, or the connection is wrong.
     pub fn add_junction_connection(&self, connection: JunctionConnection) -> Result<(), Error> {
-        let added = self.with(move |engine| engine.add_junction_connection(connection))?;
+        let added = self.act(move |engine| engine.add_junction_connection(connection))?;
         Ok(added.map_err(ActivateError::Junction)?)
     }
 
@@ -301,7 +291,7 @@ impl SupervisorThread {
             published.states_of(engine);
             applied
         };
-        let apply = || self.with(apply)?.map_err(Error::from);
+        let apply = || self.act(apply)?.map_err(Error::from);
         match self.check_connections().and_then(|()| apply()) {
             Ok(active) => {
                 let (window, published) = (self.0.window.clone(), self.0.published.clone());
@@ -386,7 +376,7 @@ impl SupervisorThread {
 
 impl InOrder for SupervisorThread {
     fn catch_up(&self) -> Result<(), Error> {
-        self.with(|_| ())
+        self.act(|_| ())
     }
 
     fn wake(&self) {
@@ -459,14 +449,14 @@ impl AcyclicHalf for SupervisorThread {
     }
 
     fn info(&self, subdevice: SubDeviceId) -> Option<SubDeviceInfo> {
-        self.with(move |engine| engine.info(subdevice)).ok().flatten()
+        self.act(move |engine| engine.info(subdevice)).ok().flatten()
     }
 
     fn keep_events(&mut self, _now: Instant) {}
 
     fn not_ready(&self) -> Result<Vec<(SubDeviceName, Reason)>, Error> {
         let failures = self.rest().failures;
-        self.with(move |engine| failures.explain(engine))
+        self.act(move |engine| failures.explain(engine))
     }
 }
 

@@ -1,7 +1,7 @@
 //! The configuration file: the variables of the IgH manual (7.4), and those of RingCAT.
 //!
 //! In: a file. Out: what the daemon is to do, and what each variable was understood as; or all mistakes with their
-//! lines. [`syntax`]: assignments as `sh` has them; [`variables`]: their meaning; [`place`]: which file counts.
+//! lines. [`syntax`]: assignments as `sh` has them; [`variables`]: their meaning; [`place`]: which file is used.
 
 mod model;
 pub mod place;

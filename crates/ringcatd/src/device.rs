@@ -94,7 +94,7 @@ impl Device {
     /// The interface, if it is there. `others` are never taken as the first one.
     ///
     /// # Errors
-    /// It is no Ethernet interface, or none is free: what hinders each.
+    /// It is no Ethernet interface, or none is free, with the reason for each.
     pub fn find(&self, others: &[Device]) -> Result<Option<Found>, String> {
         let name = match self {
             Device::Name(name) => Some(name.clone()),
@@ -115,7 +115,7 @@ impl Device {
         all.into_iter().next().map(|it| it.name)
     }
 
-    /// What is said of it while it is not there.
+    /// Its description in messages while it is absent.
     pub fn missing(&self) -> String {
         let present: Vec<Interface> = interface::list();
         let names = || present.iter().map(|it| it.name.clone()).collect();

@@ -41,7 +41,7 @@ impl Default for Current {
 }
 
 impl Current {
-    /// To look at it.
+    /// For reading.
     pub fn lock(&self) -> MutexGuard<'_, Driver> {
         self.driver.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -53,7 +53,7 @@ impl Current {
         before
     }
 
-    /// Takes what the daemon drives out of its hands. While the master is on its way to the daemon, and while the
+    /// Takes over what the daemon drives. While the master is on its way to the daemon, and while the
     /// daemon has not seen yet that the process of the owner has ended, that is waited for, up to a limit.
     ///
     /// # Errors
@@ -122,11 +122,11 @@ mod tests {
         Arc::new(wires.open().expect("the segment takes them"))
     }
 
-    /// What a request gets that waits while the master has a fault at last.
+    /// The answer to a request that waits, when the master has a fault in the end.
     fn refused_at_last(current: &Current) -> Refusal {
         std::thread::scope(|scope| {
             let waits = scope.spawn(|| current.take_from_daemon(3, LONG));
-            // Whether the request comes before it or after it: a refusal for the time of the change is none.
+            // The request may come before or after it: a refusal because of the change is not a fault.
             std::thread::sleep(SHORT);
             current.set(Driver::Fault("at last".to_owned()));
             waits.join().expect("no panic").expect_err("nothing drives it")

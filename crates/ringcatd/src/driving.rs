@@ -25,7 +25,7 @@ const SETTLE: Duration = Duration::from_secs(3);
 const STILL: Duration = Duration::from_millis(100);
 /// SubDevices reach their safe state within this time.
 const LEAD: Duration = Duration::from_secs(10);
-/// Interval of looks at a scan.
+/// Interval at which the progress of a scan is read.
 const LOOK: Duration = Duration::from_millis(1);
 
 /// What outlasts hand-overs of a master.
@@ -41,7 +41,7 @@ pub struct Lasting<'a> {
     pub debug_level: u32,
     /// Network interfaces of EoE; `None`: there are none.
     pub interfaces: Option<Arc<EthernetInterfaces>>,
-    /// What was heard on the links: nothing is sent before that.
+    /// Frames received on the links: nothing is sent before.
     pub listened: Arc<Listened>,
 }
 
@@ -114,7 +114,7 @@ impl Driving {
         wait_until_settled(&supervisor);
         // What has changed last is printed by the next process that drives the master.
         log.end_soon();
-        // A thread that has ended knows nothing.
+        // A thread that has ended has no knowledge.
         let knowledge = supervisor.hand_over().ok().flatten();
         knowledge.as_ref().map(Knowledge::to_bytes).unwrap_or_default()
     }
@@ -152,7 +152,7 @@ fn wait_until_settled(supervisor: &SupervisorThread) {
         }
         // Some may be in a safe state, or in an error that nothing ends.
         let is_still = seen.al_states == settled || since.elapsed() >= STILL;
-        let is_reading = || supervisor.with(|engine| engine.are_pdos_awaited()).unwrap_or(false);
+        let is_reading = || supervisor.are_pdos_awaited().unwrap_or(false);
         if seen.responding() == 0 || begin.elapsed() >= SETTLE || is_still && !is_reading() {
             return;
         }
@@ -164,7 +164,7 @@ fn wait_until_settled(supervisor: &SupervisorThread) {
 fn wait_for_first_scan(supervisor: &SupervisorThread) {
     let begin = Instant::now();
     while begin.elapsed() < FIRST_SCAN {
-        match supervisor.with(|engine| engine.snapshot()) {
+        match supervisor.snapshot() {
             Ok(seen) if seen.activity == Activity::Unscanned && has_carrier(&seen) => std::thread::sleep(LOOK),
             _ => return,
         }
@@ -179,7 +179,7 @@ fn has_carrier(seen: &Snapshot) -> bool {
 fn wait_for_scan(supervisor: &SupervisorThread) {
     let begin = Instant::now();
     while begin.elapsed() < SCAN {
-        match supervisor.with(|engine| engine.snapshot().activity) {
+        match supervisor.snapshot().map(|seen| seen.activity) {
             Ok(Activity::Scanning) => std::thread::sleep(LOOK),
             _ => return,
         }

@@ -10,9 +10,9 @@
 //!   does; [`others`]: another MainDevice that does;
 //! * [`ethernet`]: network interfaces of EoE, which outlast applications;
 //! * [`owner`]: questions to an application that drives a master; [`tenure`]: its time, and what ends it;
-//!   [`process_state`]: what the kernel tells of its process; [`owner_lock`]: what of it outlives the daemon;
+//!   [`process_state`]: what the kernel shows of its process; [`owner_lock`]: what of it outlives the daemon;
 //! * [`listening`], [`session`], [`rights`]: clients, what they ask, what they may;
-//! * [`daemon`]: all of it; [`running`]: from its start to its end; [`service_manager`]: what that is told; [`log`]:
+//! * [`daemon`]: all of it; [`running`]: from its start to its end; [`service_manager`]: messages to that; [`log`]:
 //!   lines for the operator.
 //!
 //! A thread serves each client, so one that is slow or hostile keeps nothing but its own thread. Decisions 0074 to

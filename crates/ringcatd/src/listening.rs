@@ -19,7 +19,7 @@ use crate::session::{self, ClientProcess, Masters};
 
 /// Clients at a time.
 pub const MOST_CLIENTS: usize = 64;
-/// What a client is told that has connected, but may do nothing.
+/// The answer to a client without any right.
 const NO_RIGHT: &str = "this user may not ask; --mode and --group of ringcatd say which users may";
 /// Clients at a time that may only read: the others always find room.
 pub const MOST_READERS: usize = 48;

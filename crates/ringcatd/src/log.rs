@@ -90,12 +90,12 @@ impl Log {
     }
 }
 
-/// A line of the daemon itself. It is written soon, and never waited for.
+/// A line of the daemon itself. It is written soon; the caller does not wait.
 pub fn say(line: fmt::Arguments<'_>) {
     print(Priority::Info, format!("{NAME}: {line}"));
 }
 
-/// A line as it is. It is written soon, and never waited for.
+/// A line as it is. It is written soon; the caller does not wait.
 pub fn print(priority: Priority, line: String) {
     let is_first = !std::mem::replace(&mut LOG.lines().has_thread, true);
     if is_first {
@@ -107,7 +107,7 @@ pub fn print(priority: Priority, line: String) {
     LOG.push(priority, line);
 }
 
-/// Waits for the lines that were said, a second at most: to be called at the end of the program.
+/// Waits until all lines are written, a second at most: to be called at the end of the program.
 pub fn flush() {
     LOG.flush(LAST);
 }

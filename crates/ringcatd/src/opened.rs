@@ -147,7 +147,7 @@ impl Opened {
             if sockets().all(has_it) {
                 continue;
             }
-            // It may be gone again; the next look tries again.
+            // It may be gone again; the next check tries again.
             let is_given = sockets().all(|socket| give(socket.as_fd(), &one.name, interface).is_ok());
             self.bindings.fetch_add(1, Ordering::AcqRel);
             if is_given && !std::mem::replace(&mut one.is_there, true) {

@@ -1,4 +1,4 @@
-//! Another MainDevice on the segment of a master: heard before the daemon sends anything.
+//! Another MainDevice on the segment of a master: detected before the daemon sends anything.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,7 +9,7 @@ use ringcat_control::Refusal;
 
 use crate::log::say;
 
-/// It has been listened to the links within this time after they have a carrier.
+/// Listening on the links ends within this time after they have a carrier.
 const LISTENED: Duration = Duration::from_secs(1);
 
 /// What is known of other MainDevices on a segment.
@@ -17,7 +17,7 @@ const LISTENED: Duration = Duration::from_secs(1);
 pub struct Others {
     master: u32,
     listened: Arc<Listened>,
-    /// The operator was told of one.
+    /// One was reported to the operator.
     is_told: AtomicBool,
 }
 
@@ -69,7 +69,7 @@ impl Others {
         self.listened.forget();
     }
 
-    /// Tells the operator once that another MainDevice drives the segment, and that it does no more.
+    /// Reports once that another MainDevice drives the segment, and once that it no longer does.
     pub fn tell(&self) {
         let (master, cause) = (self.master, self.cause());
         if self.is_told.swap(cause.is_some(), Ordering::AcqRel) != cause.is_some() {

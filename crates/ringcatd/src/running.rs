@@ -1,4 +1,4 @@
-//! The daemon from its start to its end, as a service: what it is to do, masters, signs for the service manager.
+//! The daemon from its start to its end, as a service: what it is to do, masters, notifications to the service manager.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -30,7 +30,7 @@ use crate::wires::Wires;
 const DESCRIPTORS: u64 = 4096;
 /// Interval of attempts at what was not possible before.
 const LOOK: Duration = Duration::from_secs(1);
-/// Interval of looks at the first scans.
+/// Interval at which the first scans are checked.
 const SOON: Duration = Duration::from_millis(20);
 /// The daemon is ready after this time, also if a segment is still being scanned.
 const FIRST_SCAN: Duration = Duration::from_secs(20);
@@ -87,8 +87,8 @@ fn end_with_input() -> Result<(), String> {
     started.map(drop).map_err(|error| format!("a thread cannot be started: {error}"))
 }
 
-/// Says what else uses the interfaces of a master, before it has sockets of its own. An interface that is to be chosen
-/// is one that nothing else uses.
+/// Reports what else uses the interfaces of a master, before it has sockets of its own. An interface that is to be
+/// chosen is one that nothing else uses.
 fn warn_of_others(option: &MasterOption) {
     let named = option.source.devices().filter(|device| **device != Device::First);
     // One that is not there yet is waited for.
@@ -120,7 +120,7 @@ fn master(
     Ok(Master::start(settings, wires))
 }
 
-/// Looks after the masters until a signal comes, and tells the service manager how they are.
+/// Supervises the masters until a signal comes, and reports their states to the service manager.
 fn serve(daemon: &Daemon, up_down: &mut UpDown, held: &HeldSignals) {
     let mut manager = ServiceManager::new(std::process::id(), |name| std::env::var_os(name));
     let begin = Instant::now();
@@ -151,7 +151,7 @@ fn serve(daemon: &Daemon, up_down: &mut UpDown, held: &HeldSignals) {
 #[derive(Debug, PartialEq, Eq)]
 struct Status {
     text: String,
-    /// It answers, or waits for something that has been said.
+    /// It answers, or waits for something that was reported.
     is_ready: bool,
 }
 

@@ -1,7 +1,7 @@
-//! What the service manager is told: the daemon is ready, what it does, that it lives, that it ends.
+//! Notifications to the service manager: the daemon is ready, its status, the watchdog, its end.
 //!
 //! Datagrams of text to the socket that `NOTIFY_SOCKET` names (`sd_notify(3)`). Nothing waits: a datagram that the
-//! service manager does not take now is lost, and the next state is sent with the next look.
+//! service manager does not take now is lost, and the next state is sent with the next check.
 
 use std::ffi::OsString;
 use std::os::linux::net::SocketAddrExt;
@@ -16,7 +16,7 @@ const LONGEST: usize = 512;
 #[derive(Debug, Default)]
 pub struct ServiceManager {
     socket: Option<(UnixDatagram, SocketAddr)>,
-    /// It expects a sign of life within this time.
+    /// It expects a watchdog notification within this time.
     watchdog: Option<Duration>,
     said: String,
     is_ready: bool,
@@ -42,12 +42,12 @@ impl ServiceManager {
         self.socket.is_some()
     }
 
-    /// How long the daemon may pause between signs of life: at most this, half of what is expected.
+    /// Longest pause between watchdog notifications: half of the expected time.
     pub fn interval(&self, most: Duration) -> Duration {
         self.watchdog.filter(|_| self.is_there()).map_or(most, |limit| most.min(limit / 2))
     }
 
-    /// A sign of life, as far as one is expected.
+    /// A watchdog notification, if one is expected.
     pub fn live(&self) {
         if self.watchdog.is_some() {
             self.send("WATCHDOG=1");
@@ -63,7 +63,7 @@ impl ServiceManager {
             return;
         }
         let ready = if becomes_ready { "READY=1\n" } else { "" };
-        // What was not taken is sent again by the next report.
+        // A lost notification is sent again by the next report.
         if self.send(&format!("{ready}STATUS={shown}")) {
             shown.clone_into(&mut self.said);
             self.is_ready |= is_ready;
@@ -123,7 +123,7 @@ mod tests {
         early.stop();
         let expected = ["READY=1\nSTATUS=scans", "STATUS=4 SubDevices", "STOPPING=1\nSTATUS=ends"];
         assert_eq!(received(&socket), expected);
-        // A reader that takes nothing holds nothing up.
+        // A reader that does not read delays nothing.
         for number in 0..100_000 {
             early.report(&number.to_string(), true);
         }

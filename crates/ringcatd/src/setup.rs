@@ -1,4 +1,4 @@
-//! What the daemon is to do: from options, and from a configuration file. An option counts before a variable.
+//! What the daemon is to do: from options, and from a configuration file. An option has priority over a variable.
 
 use std::path::PathBuf;
 

@@ -39,7 +39,7 @@ impl Delivery {
 
 /// One cycle of a domain.
 #[derive(Clone, Debug)]
-pub struct Judged {
+pub struct Evaluated {
     /// The domain.
     pub domain: DomainId,
     /// Begin of the cycle that evaluated it.
@@ -71,11 +71,11 @@ pub struct Mirror {
     areas: Vec<Area>,
     flights: Vec<Option<Flight>>,
     compared: u64,
-    /// Frames of the cycle that is judged next were sent again: fresh inputs do not show that outputs were taken,
+    /// Frames of the cycle that is evaluated next were sent again: fresh inputs do not show that outputs were taken,
     /// because outputs of some devices are never repeated.
     pub was_sent_again: bool,
     /// Whether a difference to latched outputs is a failure.
-    pub judges_latched: bool,
+    pub evaluates_latched: bool,
 }
 
 impl Mirror {
@@ -90,7 +90,7 @@ impl Mirror {
             flights: (0..domains).map(|_| None).collect(),
             compared: 0,
             was_sent_again: false,
-            judges_latched: true,
+            evaluates_latched: true,
         }
     }
 
@@ -103,7 +103,7 @@ impl Mirror {
     ///
     /// # Panics
     /// When image and device differ.
-    pub fn judge(
+    pub fn evaluate(
         &mut self,
         status: DomainStatus,
         domain: DomainId,
@@ -142,7 +142,7 @@ impl Mirror {
             };
             let (Some(got), Some(expected)) = (got, expected) else { continue };
             self.compared += got.len() as u64;
-            if self.judges_latched {
+            if self.evaluates_latched {
                 assert_eq!(got, expected, "{:?} of {} in domain {}", area.direction, device.name(), domain.0);
             }
         }

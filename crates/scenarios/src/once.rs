@@ -1,6 +1,6 @@
 //! What a device must not receive twice within a cycle, from its own description and registers and its declaration.
 //!
-//! Decided here independently of the engine: a SubDevice with CoE that was not told to run free takes each write of
+//! Decided here independently of the engine: a SubDevice with CoE that was not reported to run free takes each write of
 //! outputs for an event (SM-synchronous); a SyncManager with one buffer is empty after a read and full after a write.
 
 use ringcat::{Direction, SubDeviceConfig};

@@ -123,7 +123,7 @@ pub struct Outcome {
 }
 
 /// The device that has mailboxes with all protocols.
-pub const fn speaker(count: usize) -> usize {
+pub const fn mailbox_device(count: usize) -> usize {
     count / 2
 }
 
@@ -147,9 +147,9 @@ pub fn segment(count: usize, detection: Duration) -> Network {
     const KINDS: [&str; 6] =
         ["digital-output-8", "digital-input-8", "block", "digital-output-16", "digital-input-16", "analog-output-4"];
     let mut kinds: Vec<&str> = KINDS.into_iter().cycle().take(count).collect();
-    kinds[speaker(count)] = "all-protocols";
+    kinds[mailbox_device(count)] = "all-protocols";
     let mut described: Vec<DeviceDescription> = descriptions(&kinds);
-    let ethernet = &mut described[speaker(count)].services.eoe;
+    let ethernet = &mut described[mailbox_device(count)].services.eoe;
     (ethernet.address, ethernet.mask) = (Some(ADDRESSES.device.into()), Some([255, 255, 255, 0].into()));
     ethernet.end = EoeEnd::Stack;
     for it in &mut described {
@@ -202,7 +202,7 @@ impl Bed {
             let mut images = Vec::new();
             for cycle in 0..cycles {
                 if falls && (cycle == BEFORE || cycle == BEFORE + FALL) {
-                    world.hang(DeviceIndex(speaker(count)), cycle == BEFORE);
+                    world.hang(DeviceIndex(mailbox_device(count)), cycle == BEFORE);
                 }
                 world.cycle();
                 images.push(world.application().exchange().image(DomainId(0)).to_vec());
@@ -249,12 +249,12 @@ fn start(case: &Case, phases: &[StartPhase]) -> Outcome {
     world.run_cycles(AFTER_EDGE);
     let all = world.events(world.beginning());
     assert_eq!(troubles(all), Vec::<&Event>::new(), "{case:?}");
-    let told = ring_events(all);
-    let opened = told.iter().filter(|event| matches!(event, Event::RingOpened { .. })).count();
-    let closed = told.iter().filter(|event| matches!(event, Event::RingClosed { .. })).count();
-    assert!(opened <= 1 && opened == closed, "{case:?}: {told:?}");
+    let reports = ring_events(all);
+    let opened = reports.iter().filter(|event| matches!(event, Event::RingOpened { .. })).count();
+    let closed = reports.iter().filter(|event| matches!(event, Event::RingClosed { .. })).count();
+    assert!(opened <= 1 && opened == closed, "{case:?}: {reports:?}");
     let cable = cable_of_ring(case.cable, case.count);
-    let misplaced = told.iter().find(|event| matches!(event, Event::BreakLocated { cable: at } if *at != cable));
+    let misplaced = reports.iter().find(|event| matches!(event, Event::BreakLocated { cable: at } if *at != cable));
     assert_eq!(misplaced, None, "{case:?}");
     is_whole(&world, case);
     Outcome::default()
@@ -269,7 +269,7 @@ fn is_whole(world: &World, case: &Case) {
         "{case:?}"
     );
     assert!(world.all_in_op() && world.application().all_settled(), "{case:?}");
-    let last = world.judged(world.beginning()).last().map(|judged| judged.delivery);
+    let last = world.evaluated(world.beginning()).last().map(|evaluated| evaluated.delivery);
     assert_eq!(last, Some(Delivery::Complete), "{case:?}");
 }
 
@@ -292,7 +292,7 @@ impl Pair<'_> {
     fn cycle(&mut self, case: &Case) {
         self.cut.cycle();
         let world = &self.cut;
-        let last = world.judged(world.beginning()).last();
+        let last = world.evaluated(world.beginning()).last();
         self.calm = if last.is_some_and(|it| it.delivery == Delivery::Complete) { self.calm + 1 } else { 0 };
         self.taken += self.count_latches(case);
         let world = &self.cut;
@@ -355,7 +355,7 @@ async fn stream(mailbox: Mailbox) -> Vec<u8> {
 
 /// Starts work that continues over both edges.
 fn begin(world: &mut World, case: &Case) -> Option<Pending<Vec<u8>>> {
-    let mailbox = world.mailbox(speaker(case.count));
+    let mailbox = world.mailbox(mailbox_device(case.count));
     match case.phase {
         Phase::Sdo => Some(world.start(write_and_read_object(mailbox))),
         Phase::Foe => Some(world.start(write_and_read_file(mailbox))),
@@ -377,7 +377,7 @@ fn wait(detection: Duration) -> u64 {
 
 fn operate(case: &Case, twin: &[Vec<u8>]) -> Outcome {
     let cut = in_op(case.count, case.detection);
-    let apart = matches!(case.phase, Phase::StateChange | Phase::StateRequest).then(|| speaker(case.count));
+    let apart = matches!(case.phase, Phase::StateChange | Phase::StateRequest).then(|| mailbox_device(case.count));
     let latched = cut.network().devices().map(Device::outputs_latched).collect();
     let mut pair = Pair { cut, twin: twin.iter(), calm: 0, compared: 0, latched, apart, taken: 0 };
     pair.cut.application_mut().links_mut().measure_flights();
@@ -395,15 +395,15 @@ fn operate(case: &Case, twin: &[Vec<u8>]) -> Outcome {
     for (at, fault) in [Fault::Cut(CableId(case.cable)), Fault::Heal(CableId(case.cable))].into_iter().enumerate() {
         let mark = pair.cut.mark();
         let state = [AlState::PreOp, AlState::Op][at];
-        let speaker = speaker(case.count);
+        let mailbox_device = mailbox_device(case.count);
         let asked = (case.phase == Phase::StateRequest)
-            .then(|| pair.cut.application_mut().engine_mut().start_state_request(SubDeviceId(speaker), state));
+            .then(|| pair.cut.application_mut().engine_mut().start_state_request(SubDeviceId(mailbox_device), state));
         pair.cut.fault_in(CYCLE * case.moment / 1000, fault);
         pair.cycles(case, wait(case.detection));
         if let Some(asked) = asked {
             let reached = pair.cut.finish(Duration::from_secs(2), asked);
             reached.unwrap_or_else(|error| panic!("{case:?}: {state}: {error}"));
-            assert_eq!(pair.cut.network().device(DeviceIndex(speaker)).al_status(), AlStatus::new(state));
+            assert_eq!(pair.cut.network().device(DeviceIndex(mailbox_device)).al_status(), AlStatus::new(state));
         }
         let world = &pair.cut;
         let expected: Vec<&Event> = if at == 0 { opened.iter().collect() } else { closed.iter().collect() };
@@ -435,7 +435,7 @@ fn operate(case: &Case, twin: &[Vec<u8>]) -> Outcome {
 fn disturb(pair: &mut Pair<'_>, case: &Case) -> Option<usize> {
     let fallen = match case.phase {
         Phase::StateChange => Some(fall(pair, case)),
-        Phase::StateRequest => Some(speaker(case.count)),
+        Phase::StateRequest => Some(mailbox_device(case.count)),
         _ => None,
     };
     if case.phase == Phase::StateRequest {
@@ -447,17 +447,17 @@ fn disturb(pair: &mut Pair<'_>, case: &Case) -> Option<usize> {
 
 /// Time from the first cycle after a mark to an event.
 fn fixed_after(world: &World, mark: Mark, event: &Event) -> Duration {
-    let told = world.events(mark).iter().find(|timed| timed.event == *event).map(|timed| timed.at);
-    let since = world.judged(mark).first().map(|judged| judged.at);
-    told.zip(since).map_or(Duration::ZERO, |(told, since)| told.since(since))
+    let reports = world.events(mark).iter().find(|timed| timed.event == *event).map(|timed| timed.at);
+    let since = world.evaluated(mark).first().map(|evaluated| evaluated.at);
+    reports.zip(since).map_or(Duration::ZERO, |(reports, since)| reports.since(since))
 }
 
 /// The SubDevice with mailboxes loses OP, as in the twin, and returns.
 fn fall(pair: &mut Pair<'_>, case: &Case) -> usize {
-    let speaker = speaker(case.count);
-    pair.cut.hang(DeviceIndex(speaker), true);
+    let mailbox_device = mailbox_device(case.count);
+    pair.cut.hang(DeviceIndex(mailbox_device), true);
     pair.cycles(case, FALL);
-    pair.cut.hang(DeviceIndex(speaker), false);
+    pair.cut.hang(DeviceIndex(mailbox_device), false);
     pair.cycles(case, 2);
-    speaker
+    mailbox_device
 }

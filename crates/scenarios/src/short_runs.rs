@@ -42,7 +42,7 @@ pub fn run(seed: u64) {
         .unwrap_or_else(|error| panic!("seed {seed}: {error}"));
     world.settle();
     // Late and duplicated frames change the devices.
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     let mut cut: Option<CableId> = None;
     let mut off: Option<DeviceIndex> = None;
     for _ in 0..3 + dice.below(6) {
@@ -60,19 +60,19 @@ pub fn run(seed: u64) {
     off.into_iter().for_each(|device| world.power_on(device));
     world.until(RECOVERY, "all back", |world| {
         let complete =
-            world.judged(world.beginning()).last().is_some_and(|judged| judged.delivery == Delivery::Complete);
+            world.evaluated(world.beginning()).last().is_some_and(|evaluated| evaluated.delivery == Delivery::Complete);
         let redundancy = world.application().ring_status().redundancy;
         let settled = world.all_in_op() && world.application().all_settled();
         settled && complete && world.application().ring() == RingState::Closed && redundancy == Redundancy::Ready
     });
     // Wait for delayed frames and for the end of the ring's damping.
     world.run_cycles(40);
-    world.judge_latched(true);
+    world.evaluate_latched(true);
     let mark = world.mark();
     world.run_cycles(15);
     assert_eq!((world.incomplete(mark), world.left_op(mark)), (0, Vec::new()));
-    let told = ring_events(world.events(world.beginning()));
-    changes_alternate(told);
+    let reports = ring_events(world.events(world.beginning()));
+    changes_alternate(reports);
     assert!(world.application().pace().skipped == 0 && world.now().0 > CYCLE.as_nanos() as u64);
 }
 
@@ -98,10 +98,10 @@ fn next_fault(dice: &mut Dice, count: usize, cut: &mut Option<CableId>, off: &mu
 }
 
 /// The ring opens and closes alternately, and is closed at the end.
-fn changes_alternate<'a>(told: impl IntoIterator<Item = &'a Event>) {
+fn changes_alternate<'a>(reports: impl IntoIterator<Item = &'a Event>) {
     // Each change is reported once: never the same twice in a row.
     let (mut is_open, mut edges) = (false, 0);
-    for event in told {
+    for event in reports {
         match event {
             Event::RingOpened { .. } => assert!(!std::mem::replace(&mut is_open, true), "opened twice"),
             Event::RingClosed { .. } => assert!(std::mem::replace(&mut is_open, false), "closed twice"),

@@ -89,7 +89,7 @@ impl Truth {
     ///
     /// # Panics
     /// When inputs are fresh that the SubDevice did not write into a frame of the cycle.
-    pub fn judge(&mut self, status: DomainStatus, domain: DomainId, exchange: &Exchange, network: &Network) {
+    pub fn evaluate(&mut self, status: DomainStatus, domain: DomainId, exchange: &Exchange, network: &Network) {
         let Some(remembered) = self.departures.get(domain.0).filter(|_| !status.pending) else { return };
         let out = remembered.len().saturating_sub(self.under_way);
         let departures: Vec<&Sent> = remembered.iter().skip(out).collect();

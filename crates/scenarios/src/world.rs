@@ -25,7 +25,7 @@ use ringcat_wire::register::map;
 
 use self::journal::Journal;
 pub use self::journal::Step;
-use crate::check::{Delivery, Judged, Mirror};
+use crate::check::{Delivery, Evaluated, Mirror};
 use crate::once::Declared;
 use crate::seeds;
 use crate::tap::{Fingerprint, Tap};
@@ -42,7 +42,7 @@ const SCAN_LIMIT: Duration = Duration::from_secs(20);
 #[derive(Clone, Copy, Debug)]
 pub struct Mark {
     events: usize,
-    judged: usize,
+    evaluated: usize,
     steps: usize,
 }
 
@@ -146,9 +146,9 @@ impl World {
     /// Determines the device of each declared SubDevice by its station address, and checks these devices from now on.
     pub fn recognise(&mut self) {
         self.devices = self.by_station(|_| true);
-        let judged = self.mirror.judges_latched;
+        let evaluated = self.mirror.evaluates_latched;
         self.mirror = Mirror::new(self.application.directory(), &self.devices, self.domains);
-        self.mirror.judges_latched = judged;
+        self.mirror.evaluates_latched = evaluated;
         self.truth.follow(self.application.directory(), &self.devices);
     }
 
@@ -169,10 +169,10 @@ impl World {
     /// When this takes more than 5 s.
     pub fn settle(&mut self) {
         self.until(Duration::from_secs(5), "everything settled and complete", |world| {
-            let last = world.journal.judged.iter().rev().take(world.domains);
+            let last = world.journal.evaluated.iter().rev().take(world.domains);
             world.application.all_settled()
-                && world.journal.judged.len() >= world.domains
-                && last.clone().all(|judged| judged.delivery == Delivery::Complete)
+                && world.journal.evaluated.len() >= world.domains
+                && last.clone().all(|evaluated| evaluated.delivery == Delivery::Complete)
         });
     }
 
@@ -208,12 +208,12 @@ impl World {
         self.mirror.was_sent_again = !again.is_empty();
         let network = self.application.links().network();
         for (domain, status) in due {
-            self.truth.judge(status, domain, self.application.exchange(), network);
+            self.truth.evaluate(status, domain, self.application.exchange(), network);
             let exchange = self.application.exchange();
-            let delivery = self.mirror.judge(status, domain, exchange, network);
+            let delivery = self.mirror.evaluate(status, domain, exchange, network);
             if delivery != Delivery::None {
                 let stale = self.mirror.stale(domain, exchange);
-                self.journal.judge(Judged { domain, at, status, delivery, stale });
+                self.journal.evaluate(Evaluated { domain, at, status, delivery, stale });
             }
             if exchange.status(domain).is_some_and(|now| now.skipped == status.skipped) {
                 self.mirror.depart(domain, exchange, network);
@@ -322,8 +322,8 @@ impl World {
 
     /// Whether latched outputs of devices are compared with the image, too. Late and duplicated frames change them; the
     /// devices' logs are checked at all times.
-    pub fn judge_latched(&mut self, judged: bool) {
-        self.mirror.judges_latched = judged;
+    pub fn evaluate_latched(&mut self, evaluated: bool) {
+        self.mirror.evaluates_latched = evaluated;
     }
 
     /// From now on outputs of all tries of a cycle must be alike, and follow in the order of cycles: for worlds with
@@ -355,13 +355,13 @@ impl World {
 
     /// The present point in the history.
     pub fn mark(&self) -> Mark {
-        let Journal { events, judged, steps, .. } = &self.journal;
-        Mark { events: events.len(), judged: judged.len(), steps: steps.len() }
+        let Journal { events, evaluated, steps, .. } = &self.journal;
+        Mark { events: events.len(), evaluated: evaluated.len(), steps: steps.len() }
     }
 
     /// The beginning of the history.
     pub fn beginning(&self) -> Mark {
-        Mark { events: 0, judged: 0, steps: 0 }
+        Mark { events: 0, evaluated: 0, steps: 0 }
     }
 
     /// Events since a point.
@@ -375,13 +375,13 @@ impl World {
     }
 
     /// Evaluations of domains since a point.
-    pub fn judged(&self, since: Mark) -> &[Judged] {
-        &self.journal.judged[since.judged..]
+    pub fn evaluated(&self, since: Mark) -> &[Evaluated] {
+        &self.journal.evaluated[since.evaluated..]
     }
 
     /// Evaluations since a point with missing data of a SubDevice that could have responded.
     pub fn incomplete(&self, since: Mark) -> usize {
-        self.judged(since).iter().filter(|judged| judged.delivery.is_incomplete()).count()
+        self.evaluated(since).iter().filter(|evaluated| evaluated.delivery.is_incomplete()).count()
     }
 
     /// Devices that left OP since a point.
@@ -420,7 +420,8 @@ impl World {
         for (number, (state, station)) in engine.states().into_iter().zip(engine.stations()).enumerate() {
             text += &format!("declared {number}: station {station}, {state:?}\n");
         }
-        let last = self.journal.judged.last().map(|judged| (judged.delivery, judged.status, &judged.stale));
+        let last =
+            self.journal.evaluated.last().map(|evaluated| (evaluated.delivery, evaluated.status, &evaluated.stale));
         text + &format!("ring {:?}, last cycle {last:?}\n", self.application.ring())
     }
 

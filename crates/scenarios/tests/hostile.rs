@@ -183,14 +183,14 @@ fn lies(seed: u64) {
     let (network, expected) = segment(&mut dice, seed);
     let options = Options::default().with_sii_cache(dice.one_in(2));
     let (one_in, left) = (*dice.pick(&[2, 10, 100]), Rc::new(Cell::new(0)));
-    let lies_left = left.clone();
-    let mut liar = dice;
+    let changes_left = left.clone();
+    let mut tamperer = dice;
     let links = TamperedLinks::new(network, LIMIT, move |frame| {
-        if lies_left.get() == 0 || !liar.one_in(one_in) {
+        if changes_left.get() == 0 || !tamperer.one_in(one_in) {
             return Verdict::Arrives;
         }
-        lies_left.set(lies_left.get() - 1);
-        lie(&mut liar, frame)
+        changes_left.set(changes_left.get() - 1);
+        lie(&mut tamperer, frame)
     });
     let mut main_device = MainDevice::request(links, &options);
     for _ in 0..3 {

@@ -78,8 +78,11 @@ const PUBLISHED: [&str; 11] =
 const GUIDE: &str = "docs/guide/";
 const EXAMPLES: usize = 20;
 
+/// Up to which commit the language is reviewed; what is newer is `git log COMMIT..`.
+const REVIEWED: &str = "up to commit 79dfece8, 2026-11-29; of that day pages, and comments of config, ringcatd and cli";
+
 /// Bars that are measured by running something: what, the bar, the command.
-pub const ELSEWHERE: [(&str, &str, &str); 7] = [
+pub const ELSEWHERE: [(&str, &str, &str); 8] = [
     ("instructions of a cycle", "bars in the program", "ci/bench (cycle, socket_cycle)"),
     ("start-up in virtual time", "bars in the program", "ci/bench (figures startup, figures phases)"),
     (
@@ -90,6 +93,7 @@ pub const ELSEWHERE: [(&str, &str, &str); 7] = [
     ("the same before and after", "+1 %", "docs/performance.md, section \"Before and after the model of the segment\""),
     ("scenarios; random explorers", "all pass", "cargo test --workspace; ci/explore --full"),
     ("packages of all published crates", "built", "ci/package"),
+    ("pages and comments reviewed by a reader that did not write them", "all", REVIEWED),
     ("tasks and pauses that poll, with reasons", "listed", "cargo test -p ringcat-engine --test waits -- --nocapture"),
 ];
 

@@ -87,10 +87,39 @@ pub fn beside_the_library(tree: &Tree) -> Vec<Finding> {
     findings
 }
 
+/// Programs and examples: the library's own functions are enough for them.
+const PROGRAMS: [&str; 5] =
+    ["crates/cli/src/", "crates/ethercat/src/", "crates/ffi/src/", "crates/ringcat/examples/", "crates/ringcatd/src/"];
+
+/// Programs and examples that reach through the library to its engine (feature `engine`): only checkers and tests do.
+pub fn reach_the_engine(tree: &Tree) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let is_program = |path: &str| PROGRAMS.iter().any(|program| path.starts_with(program));
+    for file in tree.rust().filter(|file| is_program(&file.path)) {
+        for token in tokens(&file.text) {
+            if let Some(name @ ("engine" | "engine_mut" | "Engine")) = token.ident() {
+                let text = format!("{name}: what a program needs of the engine is a function of the library");
+                findings.push(Finding::new(&file.path, token.line, text));
+            }
+        }
+    }
+    findings
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::tree::File;
+
+    #[test]
+    fn a_program_that_reaches_the_engine_is_found() {
+        let found = |path: &str, text| reach_the_engine(&Tree { files: vec![File::new(path, text)] }).len();
+        let text = "fn f() { supervisor.with(|engine| engine.poll(now)); }";
+        assert_eq!(found("crates/cli/src/a.rs", text), 2);
+        assert_eq!(found("crates/ringcatd/src/a.rs", "application.engine_mut().stop();"), 1);
+        assert_eq!(found("crates/ringcatd/tests/a.rs", text), 0);
+        assert_eq!(found("crates/cli/src/a.rs", "supervisor.clocks_locked() // as the engine says"), 0);
+    }
 
     const PACKET: &str = "ringcat v0.1.0 (/r/crates/ringcat)\nringcat-link v0.1.0 (/r/crates/link)\nlibc v0.2.1\n\
                           ringcat-link v0.1.0 (/r/crates/link) (*)\n";

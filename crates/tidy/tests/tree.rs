@@ -73,6 +73,12 @@ fn examples_and_the_program_use_the_library_alone() {
 
 // covers: tree
 #[test]
+fn programs_do_not_reach_through_the_library_to_its_engine() {
+    none(dependencies::reach_the_engine(&tree()));
+}
+
+// covers: tree
+#[test]
 fn modules_of_the_engine_name_each_other_as_the_map_says() {
     none(modules::forbidden_arrows_in_engine(&tree()));
 }

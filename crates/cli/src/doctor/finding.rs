@@ -1,11 +1,11 @@
-//! What a look has found, and its text for people.
+//! The finding of a check, and its text for people.
 //!
-//! A [`Topic`] is one thing that is looked at, with why it matters; its findings say how it is on this machine. Texts
+//! A [`Topic`] is one thing that is checked, with why it matters; its findings say how it is on this machine. Texts
 //! come from files of the machine in part, so control characters and length are limited here.
 
 use std::fmt::Display;
 
-use super::look::Unseen;
+use super::inspect::Unseen;
 use crate::json;
 
 /// Characters of a finding; names and contents of files can be of any length.
@@ -22,7 +22,7 @@ pub enum Level {
     Bad,
     /// It costs microseconds, or concerns only some ways to use this machine.
     Minor,
-    /// The look was not possible.
+    /// The check was not possible.
     Unknown,
     /// As it should be.
     Good,
@@ -43,7 +43,7 @@ impl Level {
     }
 }
 
-/// One thing that is looked at.
+/// One thing that is checked.
 #[derive(Clone, Copy, Debug)]
 pub struct Topic {
     /// Its name in JSON and in docs/doctor.md.
@@ -81,12 +81,12 @@ impl Topic {
         self.find(Level::Bad, what, mend)
     }
 
-    /// The look was not possible.
+    /// The check was not possible.
     pub fn unknown(self, why_not: impl Display) -> Finding {
         self.find(Level::Unknown, why_not, &[])
     }
 
-    /// What a look gave, or why it was not possible.
+    /// The result of a check, or why it was not possible.
     pub fn of(self, finding: Result<Finding, Unseen>) -> Finding {
         finding.unwrap_or_else(|unseen| self.unknown(unseen))
     }

@@ -3,8 +3,8 @@
 //! Nothing that is found is run. What belongs to RingCAT has its name in it.
 
 use super::finding::{Finding, Topic};
+use super::inspect::{self, Inspect, Unseen};
 use super::loader_cache;
-use super::look::{self, Look, Unseen};
 
 const MODULES: Topic = Topic {
     id: "kernel-modules",
@@ -23,23 +23,23 @@ const NO_MODULE: &str = "ec_sys";
 /// Most directories of a search path.
 const MOST: usize = 256;
 
-/// All looks for another MainDevice.
-pub fn look(machine: &dyn Look) -> Vec<Finding> {
+/// All checks for another MainDevice.
+pub fn checks(machine: &dyn Inspect) -> Vec<Finding> {
     let path = directories(machine, &["PATH"], &[]);
     let includes = directories(machine, &["CPATH", "C_INCLUDE_PATH"], &["/usr/local/include", "/usr/include"]);
     vec![
         MODULES.of(modules(machine)),
         match path.is_empty() {
             true => PROGRAM.unknown("PATH names no directory"),
-            false => judge(machine, PROGRAM, &files(&path, "ethercat"), b"RingCAT", "PATH"),
+            false => assess(machine, PROGRAM, &files(&path, "ethercat"), b"RingCAT", "PATH"),
         },
-        judge(machine, HEADER, &files(&includes, "ecrt.h"), b"RingCAT", "CPATH"),
+        assess(machine, HEADER, &files(&includes, "ecrt.h"), b"RingCAT", "CPATH"),
         library(machine),
     ]
 }
 
-fn modules(machine: &dyn Look) -> Result<Finding, Unseen> {
-    let Some(table) = look::read_if_there(machine, "/proc/modules")? else {
+fn modules(machine: &dyn Inspect) -> Result<Finding, Unseen> {
+    let Some(table) = inspect::read_if_there(machine, "/proc/modules")? else {
         // With /proc, but without this file, a kernel has no modules.
         machine.read("/proc/sys/kernel/osrelease")?;
         return Ok(MODULES.good("this kernel has none"));
@@ -55,7 +55,7 @@ fn modules(machine: &dyn Look) -> Result<Finding, Unseen> {
 }
 
 /// Absolute directories of variables, then further ones.
-fn directories(machine: &dyn Look, variables: &[&str], more: &[&str]) -> Vec<String> {
+fn directories(machine: &dyn Inspect, variables: &[&str], more: &[&str]) -> Vec<String> {
     let values: Vec<String> = variables.iter().filter_map(|name| machine.variable(name)).collect();
     let listed = values.iter().flat_map(|value| value.split(':')).chain(more.iter().copied());
     let mut all: Vec<String> = Vec::new();
@@ -73,7 +73,7 @@ fn files(directories: &[String], name: &str) -> Vec<String> {
 }
 
 /// The libraries that a program may be started with, in the loader's order.
-fn library(machine: &dyn Look) -> Finding {
+fn library(machine: &dyn Inspect) -> Finding {
     let mut places = files(&directories(machine, &["LD_LIBRARY_PATH"], &[]), loader_cache::NAME);
     match machine.read_bytes(loader_cache::PATH) {
         Ok(cache) => places.extend(loader_cache::places(&cache)),
@@ -81,11 +81,11 @@ fn library(machine: &dyn Look) -> Finding {
         Err(unseen) => return LIBRARY.unknown(unseen),
     }
     places.extend(files(&["/lib".to_owned(), "/usr/lib".to_owned()], loader_cache::NAME));
-    judge(machine, LIBRARY, &places, b"ringcat", "LD_LIBRARY_PATH")
+    assess(machine, LIBRARY, &places, b"ringcat", "LD_LIBRARY_PATH")
 }
 
 /// Of the files that are there, the first one is used. RingCAT's have this word in them.
-fn judge(machine: &dyn Look, topic: Topic, paths: &[String], word: &[u8], variable: &str) -> Finding {
+fn assess(machine: &dyn Inspect, topic: Topic, paths: &[String], word: &[u8], variable: &str) -> Finding {
     let mut found: Vec<(&String, bool)> = Vec::new();
     for path in paths {
         match machine.holds(path, word) {

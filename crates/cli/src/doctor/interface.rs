@@ -6,7 +6,7 @@ use ringcat_link::interface::ethtool::{Coalescing, Driver, NoAnswer, Settings};
 use ringcat_link::interface::{Interface, Unknown, UseWarning, Uses};
 
 use super::finding::{Finding, Topic};
-use super::look::{self, Look, Unseen};
+use super::inspect::{self, Inspect, Unseen};
 
 const LINK: Topic = Topic { id: "link", why: "without a link at full duplex no frame passes, or frames collide" };
 const ADDRESS: Topic =
@@ -46,8 +46,8 @@ const DAEMON: &str = "ringcatd";
 /// Speed of EtherCAT, in Mbit/s.
 const ETHERCAT_MBITS: u32 = 100;
 
-/// All looks at an interface that exists.
-pub fn look(machine: &dyn Look, interface: &Interface) -> Vec<Finding> {
+/// All checks of an interface that exists.
+pub fn checks(machine: &dyn Inspect, interface: &Interface) -> Vec<Finding> {
     let name = interface.name.as_str();
     if interface.loopback {
         let text = "it is the loopback, which no cable can be plugged into";
@@ -88,7 +88,7 @@ fn link(interface: &Interface, settings: &Settings) -> Finding {
     }
 }
 
-/// What else uses the interface. Kernel modules are looked at elsewhere.
+/// Other programs that use the interface. Kernel modules are checked elsewhere.
 fn other_users(name: &str, uses: &Uses) -> Vec<Finding> {
     let mut findings: Vec<Finding> = uses.found.iter().filter_map(other_user).collect();
     findings.extend(addresses(name, &uses.found));
@@ -155,11 +155,11 @@ fn other_user(warning: &UseWarning) -> Option<Finding> {
 }
 
 /// Whether a network manager has the interface.
-fn manager(machine: &dyn Look, interface: &Interface) -> Result<Finding, Unseen> {
+fn manager(machine: &dyn Inspect, interface: &Interface) -> Result<Finding, Unseen> {
     let (name, index) = (&interface.name, interface.index);
-    let runs = look::running(machine, &["NetworkManager"])?.is_some();
+    let runs = inspect::running(machine, &["NetworkManager"])?.is_some();
     let file = format!("/run/NetworkManager/devices/{index}");
-    let state = if runs { look::read_if_there(machine, &file)? } else { None };
+    let state = if runs { inspect::read_if_there(machine, &file)? } else { None };
     let managed = |key: &str| state.as_deref().and_then(|text| text.lines().find_map(|line| line.strip_prefix(key)));
     match managed("managed=") {
         Some("true") => {
@@ -170,7 +170,7 @@ fn manager(machine: &dyn Look, interface: &Interface) -> Result<Finding, Unseen>
         _ if runs => return Ok(MANAGER.unknown("NetworkManager runs; nmcli device status shows what it manages")),
         _ => {}
     }
-    if look::running(machine, &["systemd-network"])?.is_none() {
+    if inspect::running(machine, &["systemd-network"])?.is_none() {
         return Ok(MANAGER.good("no NetworkManager and no systemd-networkd run"));
     }
     let file = format!("/run/systemd/netif/links/{index}");
@@ -266,14 +266,14 @@ fn eee(interface: &str, settings: &Settings) -> Finding {
 }
 
 /// Received frames that the kernel collects (`napi_defer_hard_irqs`, `gro_flush_timeout`).
-fn deferred(machine: &dyn Look, interface: &Interface) -> Result<Finding, Unseen> {
+fn deferred(machine: &dyn Inspect, interface: &Interface) -> Result<Finding, Unseen> {
     let directory = format!("/sys/class/net/{}", interface.name);
     // /sys shows the network namespace in which it was mounted.
-    let index = look::number(machine, &format!("{directory}/ifindex"))?;
+    let index = inspect::number(machine, &format!("{directory}/ifindex"))?;
     if index != i64::from(interface.index) {
         return Ok(DEFERRED.unknown("/sys shows the interfaces of another network namespace"));
     }
-    let zero = |name: &str| look::number(machine, &format!("{directory}/{name}"));
+    let zero = |name: &str| inspect::number(machine, &format!("{directory}/{name}"));
     let (timeout_ns, interrupts) = (zero("gro_flush_timeout")?, zero("napi_defer_hard_irqs")?);
     if timeout_ns == 0 && interrupts == 0 {
         return Ok(DEFERRED.good("off"));

@@ -1,7 +1,7 @@
 //! The kernel: its kind, real-time throttling, its clock, and whether it runs in a virtual machine.
 
 use super::finding::{Finding, Topic};
-use super::look::{self, Look, Unseen};
+use super::inspect::{self, Inspect, Unseen};
 
 const KIND: Topic =
     Topic { id: "kernel", why: "without PREEMPT_RT, drivers and the kernel itself may delay a cycle by milliseconds" };
@@ -15,8 +15,8 @@ const VIRTUAL: Topic =
 /// Clocks that are read within tens of nanoseconds.
 const FAST_CLOCKS: [&str; 4] = ["tsc", "arch_sys_counter", "kvm-clock", "hyperv_clocksource_tsc_page"];
 
-/// All looks at the kernel.
-pub fn look(machine: &dyn Look) -> Vec<Finding> {
+/// All checks of the kernel.
+pub fn checks(machine: &dyn Inspect) -> Vec<Finding> {
     vec![
         KIND.of(kind(machine)),
         THROTTLING.of(throttling(machine)),
@@ -25,9 +25,9 @@ pub fn look(machine: &dyn Look) -> Vec<Finding> {
     ]
 }
 
-fn kind(machine: &dyn Look) -> Result<Finding, Unseen> {
+fn kind(machine: &dyn Inspect) -> Result<Finding, Unseen> {
     let release = machine.read("/proc/sys/kernel/osrelease")?;
-    let is_real_time = match look::read_if_there(machine, "/sys/kernel/realtime")? {
+    let is_real_time = match inspect::read_if_there(machine, "/sys/kernel/realtime")? {
         Some(text) => text == "1",
         None => machine.read("/proc/sys/kernel/version")?.split_whitespace().any(|word| word == "PREEMPT_RT"),
     };
@@ -42,8 +42,8 @@ fn kind(machine: &dyn Look) -> Result<Finding, Unseen> {
     Ok(KIND.bad(format!("{release} without PREEMPT_RT"), &mend))
 }
 
-fn throttling(machine: &dyn Look) -> Result<Finding, Unseen> {
-    let number = |name: &str| look::number(machine, &format!("/proc/sys/kernel/{name}"));
+fn throttling(machine: &dyn Inspect) -> Result<Finding, Unseen> {
+    let number = |name: &str| inspect::number(machine, &format!("/proc/sys/kernel/{name}"));
     let (runtime_us, period_us) = (number("sched_rt_runtime_us")?, number("sched_rt_period_us")?);
     Ok(match ringcat_link::realtime::throttled_us(runtime_us, period_us) {
         None => THROTTLING.good("off"),
@@ -54,7 +54,7 @@ fn throttling(machine: &dyn Look) -> Result<Finding, Unseen> {
     })
 }
 
-fn clock(machine: &dyn Look) -> Result<Finding, Unseen> {
+fn clock(machine: &dyn Inspect) -> Result<Finding, Unseen> {
     let source = machine.read("/sys/devices/system/clocksource/clocksource0/current_clocksource")?;
     if FAST_CLOCKS.contains(&source.as_str()) {
         return Ok(CLOCK.good(source));
@@ -64,7 +64,7 @@ fn clock(machine: &dyn Look) -> Result<Finding, Unseen> {
     Ok(CLOCK.minor(source, &mend))
 }
 
-fn virtual_machine(machine: &dyn Look) -> Result<Finding, Unseen> {
+fn virtual_machine(machine: &dyn Inspect) -> Result<Finding, Unseen> {
     let text = machine.read("/proc/cpuinfo")?;
     // Processors of ARM have Features, and no flag for this.
     let flags = text.lines().find_map(|line| line.strip_prefix("flags")).and_then(|rest| rest.split_once(':'));

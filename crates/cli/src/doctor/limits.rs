@@ -1,7 +1,7 @@
 //! What this program is permitted: raw frames, real-time priority, locked memory.
 
 use super::finding::{Finding, Topic};
-use super::look::{Look, Unseen};
+use super::inspect::{Inspect, Unseen};
 
 const FRAMES: Topic = Topic {
     id: "raw-frames",
@@ -24,8 +24,8 @@ const LIMITS: &str = "/proc/self/limits";
 /// Lasts for members of the group, from their next login on.
 const LIMITS_FILE: &str = "sudoedit /etc/security/limits.d/ethercat.conf";
 
-/// All looks at permissions.
-pub fn look(machine: &dyn Look) -> Vec<Finding> {
+/// All checks of permissions.
+pub fn checks(machine: &dyn Inspect) -> Vec<Finding> {
     let setcap = ringcat_link::setcap_command();
     vec![
         FRAMES.of(frames(machine, &setcap)),
@@ -34,14 +34,14 @@ pub fn look(machine: &dyn Look) -> Vec<Finding> {
     ]
 }
 
-fn frames(machine: &dyn Look, setcap: &str) -> Result<Finding, Unseen> {
+fn frames(machine: &dyn Inspect, setcap: &str) -> Result<Finding, Unseen> {
     Ok(match has(machine, NET_RAW)? {
         true => FRAMES.good("permitted by CAP_NET_RAW"),
         false => FRAMES.bad("this program lacks CAP_NET_RAW", &[setcap]),
     })
 }
 
-fn priority(machine: &dyn Look, setcap: &str) -> Result<Finding, Unseen> {
+fn priority(machine: &dyn Inspect, setcap: &str) -> Result<Finding, Unseen> {
     if has(machine, SYS_NICE)? {
         return Ok(PRIORITY.good("permitted by CAP_SYS_NICE"));
     }
@@ -52,7 +52,7 @@ fn priority(machine: &dyn Look, setcap: &str) -> Result<Finding, Unseen> {
     })
 }
 
-fn memory(machine: &dyn Look, setcap: &str) -> Result<Finding, Unseen> {
+fn memory(machine: &dyn Inspect, setcap: &str) -> Result<Finding, Unseen> {
     if has(machine, IPC_LOCK)? {
         return Ok(MEMORY.good("permitted by CAP_IPC_LOCK"));
     }
@@ -64,7 +64,7 @@ fn memory(machine: &dyn Look, setcap: &str) -> Result<Finding, Unseen> {
 }
 
 /// Whether this process has a capability.
-fn has(machine: &dyn Look, number: u32) -> Result<bool, Unseen> {
+fn has(machine: &dyn Inspect, number: u32) -> Result<bool, Unseen> {
     let status = machine.read(STATUS)?;
     let set = status.lines().find_map(|line| line.strip_prefix("CapEff:"));
     let set = set.and_then(|hex| u64::from_str_radix(hex.trim(), 16).ok());
@@ -72,7 +72,7 @@ fn has(machine: &dyn Look, number: u32) -> Result<bool, Unseen> {
 }
 
 /// The soft limit of this name.
-fn limit(machine: &dyn Look, name: &str) -> Result<String, Unseen> {
+fn limit(machine: &dyn Inspect, name: &str) -> Result<String, Unseen> {
     let limits = machine.read(LIMITS)?;
     let value = limits.lines().find_map(|line| line.strip_prefix(name)?.split_whitespace().next());
     let value = value.filter(|value| *value == "unlimited" || value.parse::<u64>().is_ok());

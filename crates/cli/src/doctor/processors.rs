@@ -1,7 +1,7 @@
 //! Processors: sleep states, frequencies, isolation, interrupts.
 
 use super::finding::{Finding, Topic};
-use super::look::{self, Look, Unseen};
+use super::inspect::{self, Inspect, Unseen};
 use super::processor_list::ProcessorList;
 
 const COUNT: Topic = Topic {
@@ -29,11 +29,11 @@ const PROCESSORS: &str = "/sys/devices/system/cpu";
 const LATENCY: &str = "/dev/cpu_dma_latency";
 /// Sleep states that wake up within this time are no harm, in microseconds.
 const SHORT_US: i64 = 10;
-/// Processors that are looked at one by one.
+/// Processors that are checked one by one.
 const MOST: usize = 1_024;
 
-/// All looks at processors. `interfaces` are those of the segment.
-pub fn look(machine: &dyn Look, interfaces: &[&str]) -> Vec<Finding> {
+/// All checks of processors. `interfaces` are those of the segment.
+pub fn checks(machine: &dyn Inspect, interfaces: &[&str]) -> Vec<Finding> {
     vec![
         COUNT.of(count(machine)),
         SLEEP.of(sleep_states(machine)),
@@ -46,20 +46,20 @@ pub fn look(machine: &dyn Look, interfaces: &[&str]) -> Vec<Finding> {
 }
 
 /// A list of processors in a file.
-fn list(machine: &dyn Look, path: &str) -> Result<ProcessorList, Unseen> {
+fn list(machine: &dyn Inspect, path: &str) -> Result<ProcessorList, Unseen> {
     machine.read(path)?.parse().map_err(|()| Unseen::Strange(path.to_owned()))
 }
 
-fn online(machine: &dyn Look) -> Result<ProcessorList, Unseen> {
+fn online(machine: &dyn Inspect) -> Result<ProcessorList, Unseen> {
     list(machine, &format!("{PROCESSORS}/online"))
 }
 
 /// The processor that suits a cycle best: the last one, since the first ones get what is not bound.
-fn for_cycles(machine: &dyn Look) -> u32 {
+fn for_cycles(machine: &dyn Inspect) -> u32 {
     online(machine).ok().and_then(|online| online.last()).unwrap_or(1)
 }
 
-fn count(machine: &dyn Look) -> Result<Finding, Unseen> {
+fn count(machine: &dyn Inspect) -> Result<Finding, Unseen> {
     Ok(match online(machine)?.count() {
         0 => return Err(Unseen::Strange(format!("{PROCESSORS}/online"))),
         1 => COUNT.minor("there is one", &["take a machine with two processors or more"]),
@@ -67,7 +67,7 @@ fn count(machine: &dyn Look) -> Result<Finding, Unseen> {
     })
 }
 
-fn sleep_states(machine: &dyn Look) -> Result<Finding, Unseen> {
+fn sleep_states(machine: &dyn Inspect) -> Result<Finding, Unseen> {
     let mut deepest: Option<(i64, String)> = None;
     for processor in online(machine)?.iter().take(MOST) {
         let directory = format!("{PROCESSORS}/cpu{processor}/cpuidle");
@@ -78,10 +78,10 @@ fn sleep_states(machine: &dyn Look) -> Result<Finding, Unseen> {
         for state in states.iter().filter(|name| name.starts_with("state")).take(MOST) {
             let (latency, is_disabled) =
                 (format!("{directory}/{state}/latency"), format!("{directory}/{state}/disable"));
-            if look::read_if_there(machine, &is_disabled)?.is_some_and(|text| text != "0") {
+            if inspect::read_if_there(machine, &is_disabled)?.is_some_and(|text| text != "0") {
                 continue;
             }
-            let us = look::number(machine, &latency)?;
+            let us = inspect::number(machine, &latency)?;
             if deepest.as_ref().is_none_or(|(longest, _)| us > *longest) {
                 deepest = Some((us, machine.read(&format!("{directory}/{state}/name")).unwrap_or_default()));
             }
@@ -107,12 +107,12 @@ fn sleep_states(machine: &dyn Look) -> Result<Finding, Unseen> {
 /// The file of rules for udev that has the rule.
 const RULES: &str = "sudoedit /etc/udev/rules.d/60-ethercat.rules";
 
-fn governors(machine: &dyn Look) -> Result<Finding, Unseen> {
+fn governors(machine: &dyn Inspect) -> Result<Finding, Unseen> {
     let mut others: Vec<String> = Vec::new();
     let mut seen = 0;
     for processor in online(machine)?.iter().take(MOST) {
         let path = format!("{PROCESSORS}/cpu{processor}/cpufreq/scaling_governor");
-        let Some(governor) = look::read_if_there(machine, &path)? else { continue };
+        let Some(governor) = inspect::read_if_there(machine, &path)? else { continue };
         seen += 1;
         if governor != "performance" && !others.contains(&governor) {
             others.push(governor);
@@ -125,7 +125,7 @@ fn governors(machine: &dyn Look) -> Result<Finding, Unseen> {
     })
 }
 
-fn isolated(machine: &dyn Look) -> Result<Finding, Unseen> {
+fn isolated(machine: &dyn Inspect) -> Result<Finding, Unseen> {
     let isolated = list(machine, &format!("{PROCESSORS}/isolated"))?;
     if isolated.count() > 0 {
         return Ok(ISOLATED.good(format!("{isolated}; take one of them: --cpu {}", isolated.last().unwrap_or(0))));
@@ -135,11 +135,11 @@ fn isolated(machine: &dyn Look) -> Result<Finding, Unseen> {
     Ok(ISOLATED.minor("none", &mend))
 }
 
-fn tick(machine: &dyn Look) -> Result<Finding, Unseen> {
+fn tick(machine: &dyn Inspect) -> Result<Finding, Unseen> {
     let path = format!("{PROCESSORS}/nohz_full");
     // Without the directory, its absence says nothing.
     online(machine)?;
-    let text = match look::read_if_there(machine, &path)? {
+    let text = match inspect::read_if_there(machine, &path)? {
         None => {
             return Ok(TICK.minor("this kernel cannot stop the timer interrupt", &["take a kernel with NO_HZ_FULL"]));
         }
@@ -159,8 +159,8 @@ fn tick(machine: &dyn Look) -> Result<Finding, Unseen> {
 }
 
 /// Interrupts of other devices that may come to isolated processors, and what moves interrupts.
-fn interrupts(machine: &dyn Look, interfaces: &[&str]) -> Result<Finding, Unseen> {
-    if look::running(machine, &["irqbalance"])?.is_some() {
+fn interrupts(machine: &dyn Inspect, interfaces: &[&str]) -> Result<Finding, Unseen> {
+    if inspect::running(machine, &["irqbalance"])?.is_some() {
         let mend = ["sudo systemctl disable --now irqbalance"];
         return Ok(INTERRUPTS.minor("irqbalance runs: it moves interrupts to any processor", &mend));
     }
@@ -199,9 +199,9 @@ fn is_of(line: &str, number: &str, interfaces: &[&str]) -> bool {
     head.trim() == number && words.any(|word| interfaces.contains(&word))
 }
 
-fn siblings(machine: &dyn Look) -> Result<Finding, Unseen> {
+fn siblings(machine: &dyn Inspect) -> Result<Finding, Unseen> {
     online(machine)?;
-    Ok(match look::read_if_there(machine, &format!("{PROCESSORS}/smt/active"))?.as_deref() {
+    Ok(match inspect::read_if_there(machine, &format!("{PROCESSORS}/smt/active"))?.as_deref() {
         None => SIBLINGS.good("this kernel knows none"),
         Some("0") => SIBLINGS.good("each core has one thread"),
         Some(_) => SIBLINGS

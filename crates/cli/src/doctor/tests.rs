@@ -11,14 +11,14 @@ use ringcat_link::interface::Unknown;
 use ringcat_link::interface::ethtool::{NoAnswer, Settings};
 
 use super::finding::{Finding, Level, lines};
+use super::inspect::{Inspect, Unseen};
 use super::loader_cache;
-use super::look::{Look, Unseen};
 use specimen::{GOOD, Specimen, assert_finding, of};
 
 // covers: bench
 #[test]
 fn a_good_machine_has_good_findings_only_each_with_why_it_matters() {
-    let findings = Specimen::good().look();
+    let findings = Specimen::good().checks();
     let others: Vec<&Finding> = findings.iter().filter(|finding| finding.level != Level::Good).collect();
     assert!(others.is_empty(), "{others:#?}");
     let ids: BTreeSet<&str> = findings.iter().map(|finding| finding.id).collect();
@@ -42,7 +42,7 @@ fn a_machine_that_cannot_be_read_is_unknown_and_nothing_is_guessed() {
     };
     specimen.uses.unknown = vec![Unknown::Addresses, Unknown::Membership, Unknown::Sockets];
     specimen.variables.clear();
-    let findings = specimen.look();
+    let findings = specimen.checks();
     let known: BTreeSet<&str> =
         findings.iter().filter(|finding| finding.level != Level::Unknown).map(|finding| finding.id).collect();
     // Without these directories there is no such header or library; the MTU comes with the interface.
@@ -72,7 +72,7 @@ fn files_that_hold_anything_are_unknown_and_never_a_panic() {
         let specimen = Specimen::good();
         GOOD.iter().for_each(|(path, _)| specimen.write(path, content));
         specimen.write("etc/ld.so.cache", content);
-        let findings = specimen.look();
+        let findings = specimen.checks();
         let short: Vec<u8> = content.iter().copied().take(40).collect();
         for id in strict.into_iter().filter(|_| content != b"-1") {
             assert_eq!(of(&findings, id).level, Level::Unknown, "{id} of {short:?}: {findings:#?}");
@@ -121,7 +121,7 @@ fn the_library_that_the_loader_takes_first_is_judged() {
         [(loader_cache::NAME, "/opt/other/lib/libethercat.so.1"), (loader_cache::NAME, "/usr/lib/libethercat.so.1")];
     specimen.write("etc/ld.so.cache", &loader_cache::tests::cache(&entries));
     let what = "/opt/other/lib/libethercat.so.1 is not RingCAT's, and comes before /usr/lib/libethercat.so.1";
-    assert_finding(&specimen.look(), "ethercat-library", Level::Bad, what, "LD_LIBRARY_PATH");
+    assert_finding(&specimen.checks(), "ethercat-library", Level::Bad, what, "LD_LIBRARY_PATH");
     specimen.variables.insert("LD_LIBRARY_PATH", "/usr/lib:/opt/other/lib");
-    assert_finding(&specimen.look(), "ethercat-library", Level::Good, "/usr/lib/libethercat.so.1 is RingCAT's", "");
+    assert_finding(&specimen.checks(), "ethercat-library", Level::Good, "/usr/lib/libethercat.so.1 is RingCAT's", "");
 }

@@ -9,7 +9,7 @@ use crate::descriptions::{Descriptions, LANGUAGE};
 use crate::failure::Failure;
 use crate::output::{counted, warn};
 
-/// What came from the descriptions.
+/// What the descriptions contributed.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Named {
     /// SubDevices that a description describes.
@@ -30,7 +30,7 @@ impl fmt::Display for Named {
     }
 }
 
-/// Fills in names from the description that counts for each SubDevice, and reports where both disagree.
+/// Fills in names from the description of each SubDevice, and reports where both disagree.
 pub fn fill(file: &mut NetworkFile, bus: &Bus, descriptions: &mut Descriptions) -> Result<Named, Failure> {
     let mut named = Named::default();
     for ((info, idents), subdevice) in bus.scan.subdevices.iter().zip(&bus.modules).zip(&mut file.subdevice) {
@@ -45,7 +45,7 @@ pub fn fill(file: &mut NetworkFile, bus: &Bus, descriptions: &mut Descriptions) 
         named.described += 1;
         for difference in subdevice.differences_to_esi(described.device()) {
             let (name, path) = (&subdevice.name, &described.path);
-            warn(format!("position {position} \"{name}\": {difference} ({path}): the device counts"));
+            warn(format!("position {position} \"{name}\": {difference} ({path}): the device has priority"));
         }
         let modules = described.modules(info, idents);
         named.modules += modules.len();

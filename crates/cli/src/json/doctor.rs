@@ -12,7 +12,7 @@ pub struct Doctor {
     pub bad: usize,
     /// Number of findings that cost microseconds, or concern only some uses
     pub minor: usize,
-    /// Number of looks that were not possible
+    /// Number of checks that were not possible
     pub unknown: usize,
     /// Number of findings that are good
     pub good: usize,
@@ -26,7 +26,7 @@ pub struct Doctor {
 #[derive(Clone, Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Finding {
-    /// Name of what was looked at, as in docs/doctor.md
+    /// Name of what was checked, as in docs/doctor.md
     pub id: &'static str,
     /// `bad`, `minor`, `unknown` or `good`
     pub level: &'static str,

@@ -58,7 +58,7 @@ impl Run {
     }
 
     fn clocks_locked(&self) -> bool {
-        !self.clocks || self.cycles.supervisor().with(|engine| engine.clocks_locked()).unwrap_or(false)
+        !self.clocks || self.cycles.supervisor().clocks_locked().unwrap_or(false)
     }
 
     /// Until all SubDevices are in OP and all clocks are locked, and then until process data is complete, for a moment.

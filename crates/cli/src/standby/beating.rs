@@ -1,4 +1,4 @@
-//! Links of a thread whose waits beat for the guard.
+//! Links of a thread that sends heartbeats to the guard while it waits.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -12,10 +12,10 @@ use ringcat::standby::guard::Pulse;
 use ringcat::wire::frame::MacAddress;
 use ringcat::{Instant, Link, Links, MainDeviceRole, PerLink};
 
-/// What threads that beat share.
+/// Shared by the threads that send heartbeats.
 #[derive(Debug, Default)]
 pub struct Beats {
-    /// The cycles run: only they beat.
+    /// Cycles run: only their thread sends heartbeats.
     pub cycles_run: AtomicBool,
     /// The role: as ACTIVE without cycles, this MainDevice brings up its bus, and its cyclic half has nothing to do.
     pub role: OnceLock<RoleControl>,
@@ -34,14 +34,14 @@ impl Beats {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Half {
     Cyclic,
-    /// Beats while this MainDevice brings up its bus, and there are no cycles.
+    /// Sends heartbeats while this MainDevice brings up its bus and no cycles run.
     Acyclic,
 }
 
 /// Links of one half.
 pub type HalfLinks = BeatingLinks<PacketLinks>;
 
-/// Links that beat.
+/// Links whose waits send heartbeats.
 #[derive(Debug)]
 pub struct BeatingLinks<L> {
     links: L,
@@ -53,12 +53,12 @@ pub struct BeatingLinks<L> {
 }
 
 impl<L: Links> BeatingLinks<L> {
-    /// Links of a half, which beats at least once a period.
+    /// Links of a half, with a heartbeat at least once a period.
     pub fn new(links: L, half: Half, pulse: Option<Pulse>, period: Duration, beats: Arc<Beats>) -> BeatingLinks<L> {
         BeatingLinks { links, half, pulse, period, beats }
     }
 
-    /// Beats, if that is due to this half; the end of a wait that shall end at `until`.
+    /// Sends a heartbeat if one is due from this half. Returns the end of a wait that is to end at `until`.
     fn beat(&self, now: Instant, until: Instant) -> Instant {
         let Some(pulse) = &self.pulse else { return until };
         let is_due = match self.half {

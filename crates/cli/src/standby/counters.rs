@@ -2,7 +2,7 @@
 
 use ringcat::standby::ForwardingCounters;
 
-/// Why this MainDevice and the ACTIVE cannot be two of one ring.
+/// Why this MainDevice and the ACTIVE cannot share a ring.
 pub fn same_identity(counters: &ForwardingCounters) -> Option<String> {
     let reason = "the ACTIVE has the same bytes 3 to 5 in its address as an interface here, so neither can tell its \
                   frames from those of the other: give that interface another address (ip link set IF address ...)";

@@ -18,10 +18,10 @@ use crate::times::{in_words, time};
 const PROGRAM: &str = "/proc/self/exe";
 /// The command that makes it the guard.
 const COMMAND: &str = "standby-guard";
-/// Period of checks for the end, and of looks whether the guard is there.
+/// Period of checks for the end, and for a guard that has ended.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// Shortest limit of a silence: hosts that are not made for it are late by more.
+/// Shortest limit of a silence: hosts without a real-time kernel are late by more.
 const SHORTEST: Duration = Duration::from_millis(1);
 
 /// The limit of a silence.
@@ -40,7 +40,7 @@ pub struct GuardArguments {
 
 /// Guards until the process that has started this one releases it, dies or hangs.
 pub fn run(arguments: &GuardArguments) -> ExitCode {
-    // What ends the program ends the guard only when the program says so.
+    // Signals that end the program do not end the guard; the program ends it.
     HeldSignals::hold();
     realtime::precise_timers();
     if let Some(priority) = arguments.priority {
@@ -50,7 +50,7 @@ pub fn run(arguments: &GuardArguments) -> ExitCode {
     }
     match guard::run() {
         Ok(Ending::Released) => ExitCode::SUCCESS,
-        // The program says why.
+        // The program prints the reason.
         Ok(Ending::Refused) => ExitCode::FAILURE,
         Ok(ending) => {
             let what = if ending == Ending::Died { "has ended" } else { "does not run" };
@@ -101,7 +101,7 @@ impl Guarded {
         self.guard.as_ref().map_or(LOOK, Guard::beat_period).min(LOOK)
     }
 
-    /// Beats of another thread.
+    /// Heartbeats of another thread.
     pub fn pulse(&self) -> Option<Pulse> {
         self.guard.as_ref().map(Guard::pulse)
     }
@@ -127,13 +127,13 @@ impl Guarded {
         goes_on
     }
 
-    /// Looks now and then whether the guard is there.
+    /// Checks from time to time whether the guard runs.
     pub fn check(&mut self, now: Instant) {
         if now < self.look_at || self.fault.is_some() {
             return;
         }
         self.look_at = now + LOOK;
-        // One that has acted has ended, too, and the next beat tells that.
+        // A guard that has acted has ended, too; the next heartbeat shows it.
         if self.guard.as_mut().is_some_and(|guard| !guard.is_there() && guard.beat()) {
             warn("the guard has ended: if this program is killed or hangs now, the ACTIVE has no bus");
             self.fault = Some("its guard had ended".to_owned());

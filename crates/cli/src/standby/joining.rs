@@ -60,7 +60,7 @@ impl Joiner {
         let declare = move |scan: &Scan| declarer.declare(scan, &for_closure);
         let joined = self.supervisor.clone().join(&self.policy, declare, cyclic);
         let Declared { trigger, failure } = std::mem::take(&mut *noted.lock().unwrap_or_else(PoisonError::into_inner));
-        // What was declared instead of a wrong declaration does not count.
+        // The substitute of a wrong declaration is not used.
         if let Some(failure) = failure {
             return Err(failure);
         }

@@ -19,9 +19,9 @@ pub struct News {
     pub names: Arc<OnceLock<Names>>,
     /// What is counted.
     pub seen: Takeover,
-    /// Why the other MainDevice does not take the role that it was offered.
+    /// Why the other MainDevice refuses the role.
     pub refused: Option<Partner>,
-    /// The configuration of the other MainDevice differs so.
+    /// How the configuration of the other MainDevice differs.
     pub difference: Option<String>,
 }
 
@@ -32,7 +32,7 @@ impl News {
         News { begin, log, names: Arc::default(), seen, refused: None, difference: None }
     }
 
-    /// Says what has happened since the last call.
+    /// Prints the events since the last call.
     pub fn report(&mut self, supervisor: &SupervisorThread, now: Instant) {
         if self.log.names().0.is_empty()
             && let Some(names) = self.names.get().filter(|names| names.0.iter().any(|name| !name.is_empty()))
@@ -61,7 +61,7 @@ impl News {
         }
     }
 
-    /// Says words that are no event of the MainDevice.
+    /// Prints a line that is no event of the MainDevice.
     pub fn say(&self, now: Instant, words: &str) {
         say!("{}", self.log.line(now, words));
         write_event(now.since(self.begin), None, words);
@@ -88,7 +88,7 @@ impl News {
         }
     }
 
-    /// What did not hold.
+    /// What has failed.
     pub fn reasons(&self) -> Vec<String> {
         let mut reasons = Vec::new();
         let mut add = |count: u64, words: &str| {

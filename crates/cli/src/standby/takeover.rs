@@ -1,6 +1,6 @@
 //! `ringcat standby` with a declaration: INACTIVE it follows, ACTIVE it controls the bus, and the policy decides.
 //!
-//! A thread joins the ring and then runs the cycles; it forwards meanwhile. The main thread says what happens, and ends
+//! A thread joins the ring and then runs the cycles; it forwards meanwhile. The main thread prints events, and ends
 //! both in order.
 
 use std::sync::Arc;
@@ -30,13 +30,13 @@ use crate::run::configured::ConfiguredNetwork;
 use crate::run::declared::pdos;
 use crate::verdict::{Report, Verdict};
 
-/// Period of looks at events.
+/// Interval at which events are taken.
 const LOOK: Duration = Duration::from_millis(2);
 /// SubDevices have this long to get to INIT in the end.
 const STOP_LIMIT: Duration = Duration::from_secs(5);
 /// The other MainDevice has this long to take the role.
 const HAND_OVER_LIMIT: Duration = Duration::from_secs(1);
-/// The last news come within this time.
+/// The last events arrive within this time.
 const LAST_NEWS: Duration = Duration::from_millis(30);
 /// A bus that is being brought up when the end comes is finished first, for this long at most: only then is it known
 /// what to stop.
@@ -137,7 +137,7 @@ impl Controller<'_> {
         self.end.by().map_or_else(|| "the time was over".to_owned(), |by| format!("ended by {by}"))
     }
 
-    /// Says what happens until cycles run; `None` if the end comes before, as INACTIVE.
+    /// Prints events until cycles run; `None` if the end comes before, as INACTIVE.
     fn await_joined(&mut self, joining: JoinHandle<Result<Joined, Failure>>) -> Result<Option<Joined>, Failure> {
         let mut limit = None;
         while !joining.is_finished() {
@@ -159,7 +159,7 @@ impl Controller<'_> {
         }
     }
 
-    /// Says what happens until the end comes.
+    /// Prints events until the end comes.
     fn watch(&mut self, joined: &mut Joined) {
         let mut in_op = false;
         while !self.is_over() && !joined.cycles.has_ended() {
@@ -189,7 +189,7 @@ impl Controller<'_> {
         }
         self.news.seen.handed_over = self.control.role() != MainDeviceRole::Active;
         if self.news.seen.handed_over {
-            // The other one is heard as ACTIVE before this one leaves.
+            // Frames of the new ACTIVE arrive before this one leaves.
             sleep(LAST_NEWS);
             self.news.report(&self.supervisor, now());
             return None;

@@ -1,4 +1,4 @@
-//! The parts of an ENI that are for people and for other MainDevices, and not in a declaration.
+//! Parts of an ENI that a declaration does not have: names, and values that other MainDevices read.
 
 use crate::eni::{Eni, Pdo};
 
@@ -35,7 +35,7 @@ pub struct SubDeviceDetails {
 }
 
 impl ExportDetails {
-    /// Those of an ENI.
+    /// The details of an ENI.
     pub fn of(eni: &Eni) -> ExportDetails {
         let subdevices = eni.subdevices.iter().map(|of| SubDeviceDetails {
             vendor_id: of.vendor_id,

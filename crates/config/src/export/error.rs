@@ -53,7 +53,7 @@ pub struct LeftOut {
     pub subdevice: Option<usize>,
     /// The setting.
     pub what: String,
-    /// What is without it.
+    /// The effect of its absence.
     pub reason: String,
 }
 

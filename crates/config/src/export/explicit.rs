@@ -51,7 +51,7 @@ pub(super) fn explicit(configuration: &Configuration, lrw: &Lrw, left_out: &mut 
         variable.name = one_line(&variable.name);
         variable.data_type = one_line(&variable.data_type);
     }
-    // The inputs come first in a file.
+    // An ENI lists the inputs first.
     whole.image.variables.sort_by_key(|variable| variable.direction == Direction::Outputs);
     if overlaps_in_lrw(&whole, lrw) {
         move_inputs(&mut whole, left_out);

@@ -9,7 +9,7 @@ use ringcat_engine::main_device::{Declaration, Required};
 use super::error::LeftOut;
 use crate::configuration::Configuration;
 
-/// All of a configuration.
+/// All settings of a configuration without a place.
 pub(super) fn of(configuration: &Configuration) -> Vec<LeftOut> {
     let declaration = &configuration.declaration;
     let mut left_out = Vec::new();

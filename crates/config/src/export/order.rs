@@ -62,7 +62,7 @@ pub(super) fn order(commands: &[StartupCommand]) -> Option<Order> {
     found
 }
 
-/// Calls `done` with the permutations of a list from a place on, first the list itself, until it returns true.
+/// Calls `done` with each permutation of a list behind a place, the list itself first, until it returns true.
 fn permutations(list: &mut [Section; 6], from: usize, done: &mut impl FnMut(&[Section; 6]) -> bool) -> bool {
     if from + 1 >= list.len() {
         return done(list);

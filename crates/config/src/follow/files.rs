@@ -11,7 +11,7 @@ use crate::eni::RawMailCommand;
 /// The protocol of these commands.
 pub(super) const PROTOCOL: &str = "FoE";
 
-/// A transfer, or why commands are none.
+/// A transfer, or the reason why commands are not followed.
 pub(super) struct Transfer<'a> {
     /// Its first command.
     pub command: &'a RawMailCommand,

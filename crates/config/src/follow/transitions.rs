@@ -49,7 +49,7 @@ impl Planned<'_> {
             match followed(*transition) {
                 Some(EngineTransition::Ii) if is_mail => without_mailbox = true,
                 Some(found) => commands.push((self.place, StartupCommand::new(found, self.action.clone()))),
-                // The path between OP and PREOP passes SAFEOP: the command is sent at one half of the path.
+                // The path between OP and PREOP passes through SAFEOP: the command is sent at one of both transitions.
                 None if *transition == Transition::Op && self.transitions.contains(&Transition::Sp) => {}
                 None if *transition == Transition::Po && self.transitions.contains(&Transition::Ps) => {}
                 None => left.push(transition.name()),

@@ -29,7 +29,7 @@ type ToSend = (Option<usize>, StartupCommand);
 
 /// Most memory that commands to all may take, as each SubDevice has its own copy: 64 of 1 KiB for 1,000 SubDevices.
 const MAX_BYTES: usize = 64 << 20;
-/// About the memory of a command beside its data.
+/// Approximate memory of a command besides its data.
 const COMMAND: usize = 128;
 
 impl WholeBus {
@@ -128,7 +128,7 @@ fn sent(command: &EcatCommand, addresses: &Addresses<'_>) -> Result<Way, String>
         }
         Class::Raw => {}
     }
-    // A broadcast returns the OR of all registers, which tells nothing of a single one, unless it is 0.
+    // A broadcast returns the OR of all registers: only 0 says something about a single one.
     if let Some(validate) = command.validate.as_ref().filter(|_| code == Command::Brd)
         && validate.data.iter().any(|byte| *byte != 0)
     {

@@ -26,7 +26,7 @@ use crate::compare::Stated;
 use crate::configuration::{Configuration, ImageArea, ProcessImage, SubDeviceFacts, Variable};
 use crate::eni::Port;
 
-/// Words of a revision.
+/// Halves of a revision.
 const LOW_WORD: u32 = 0x0000_FFFF;
 const HIGH_WORD: u32 = 0xFFFF_0000;
 /// Parts of the name of a variable are separated by this.

@@ -1,5 +1,5 @@
 //! Where a SubDevice as the bus shows it (its EEPROM, or its dictionary in PREOP) and its description disagree. The
-//! device counts: it takes what it has, whatever a file says of it (docs/sources.md).
+//! device has priority: a file does not change its contents (docs/sources.md).
 
 use super::model::{Buffer, Entry, SubDevice};
 use crate::esi::{self, Device, SyncManagerRole};

@@ -48,9 +48,9 @@ fn a_command_is_sent_at_each_transition_that_it_names() {
     assert_eq!(transitions(&drive(&configuration), "everywhere"), Transition::ALL);
     let with_mailbox: Vec<_> = Transition::ALL.into_iter().filter(|it| *it != Transition::Ii).collect();
     assert_eq!(transitions(&drive(&configuration), "object"), with_mailbox);
-    let told = notices(&configuration);
+    let reports = notices(&configuration);
     assert!(has_notice(&configuration, &["CoE/InitCmd \"object\"", "not sent at II: INIT has no mailbox", "line "]));
-    assert_eq!(told.iter().filter(|notice| notice.contains("not sent")).count(), 1, "{told:#?}");
+    assert_eq!(reports.iter().filter(|notice| notice.contains("not sent")).count(), 1, "{reports:#?}");
 }
 
 // covers: 8.2, eni-image

@@ -32,7 +32,7 @@ impl MainDevice {
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.scan_error.clone());
         let options = self.scan_options(extent);
         self.supervisor.spawn(async move {
-            let result = scan(&bus, &options).await;
+            let result = scan(&bus, &segment, &options).await;
             let ended = result.map_err(|error| slot.borrow_mut().insert(error).to_string());
             end_scan(&segment, ended);
         });

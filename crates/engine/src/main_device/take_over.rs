@@ -93,7 +93,6 @@ impl MainDevice {
     fn renew(&mut self, events: crate::event::EventLog) {
         let now = self.supervisor.bus().now();
         self.renew_supervisor(events, now);
-        self.supervisor.order_link(self.disconnected.take());
         let (bus, board) = (self.supervisor.bus(), self.segment.board.clone());
         let count = self.segment.view().members().count();
         let mailboxes = (0..count).map(|index| self.new_mailbox(SubDeviceId(index))).collect();

@@ -55,6 +55,8 @@ pub(super) trait Known {
     fn are_measuring(&self) -> bool;
     /// A more urgent disturbance waits until the redundant link is up.
     fn is_outranked(&self) -> bool;
+    /// The model, which knows the link that is down on purpose.
+    fn segment(&self) -> &SharedSegment;
 }
 
 /// Scans the segment after a change of ports, and passes the result to the model.
@@ -81,7 +83,7 @@ pub(super) async fn cabling(
     in_control: bool,
     reported: &LineCheck,
 ) -> Option<LineCheck> {
-    if in_control && !bus.force_disconnect(Link::Redundant, true).await {
+    if in_control && !known.segment().force_disconnect(Link::Redundant, true).await {
         bus.notice(Notice::CannotDisconnect { link: Link::Redundant });
         return scan_until_confirmed(bus, known, reported).await;
     }
@@ -90,7 +92,7 @@ pub(super) async fn cabling(
     }
     wait_for(bus, known, RingState::Open).await;
     let found = scan_until_confirmed(bus, known, reported).await;
-    bus.force_disconnect(Link::Redundant, false).await;
+    known.segment().force_disconnect(Link::Redundant, false).await;
     wait_for(bus, known, RingState::Closed).await;
     // A carrier that is still missing would be reported as lost. The links are polled less often than frames arrive.
     let (until, signal) = (bus.now() + LINK_LIMIT, bus.signal());
@@ -213,6 +215,10 @@ async fn scan_once(bus: &Bus, known: &impl Known) -> Result<Option<LineCheck>, B
 }
 
 impl Known for SharedSegment {
+    fn segment(&self) -> &SharedSegment {
+        self
+    }
+
     fn note_port_scan(&self) {
         self.observe(Observation::RoundWanted);
     }

@@ -54,8 +54,7 @@ pub(crate) async fn watch(bus: Bus, segment: SharedSegment) {
 
 /// The links and the ring, without the answer to a broadcast.
 fn words(bus: &Bus) -> Words {
-    let ring = RingWord { state: bus.ring(), ..RingWord::default() };
-    Words { links: bus.links(), carriers: bus.carriers(), ring, supervision: None, cycles: 0 }
+    Words::new(bus.links(), bus.carriers(), RingWord { state: bus.ring(), ..RingWord::default() })
 }
 
 /// One broadcast, unless no link has a carrier; in the same frame the states of some SubDevices. While a scan is under
@@ -63,11 +62,11 @@ fn words(bus: &Bus) -> Words {
 async fn broadcast(bus: &Bus, segment: &SharedSegment, number: u32, turns: &mut StateTurns) {
     let before = words(bus);
     segment.observe(Observation::Words(before));
-    segment.board.post_carriers(before.carriers);
+    segment.board.post_carriers(before.carriers());
     let is_unplugged = before.is_unplugged();
     let kept = turns.next(segment);
     let reply = if is_unplugged { None } else { ask(bus, &kept).await };
-    let now = if is_unplugged { before } else { Words { ring: words(bus).ring, ..before } };
+    let now = if is_unplugged { before } else { before.with_ring(&words(bus)) };
     let Some((supervision, read)) = reply else {
         segment.board.post_silence();
         if segment.view().is_scanning() {
@@ -79,7 +78,7 @@ async fn broadcast(bus: &Bus, segment: &SharedSegment, number: u32, turns: &mut 
     if segment.view().is_scanning() {
         return;
     }
-    segment.observe(Observation::Words(Words { supervision: Some((number, supervision)), ..now }));
+    segment.observe(Observation::Words(now.with_result(number, supervision)));
     segment.observe_idle(IdleObservation::SomeRead(&read));
 }
 
@@ -106,7 +105,7 @@ async fn ask(bus: &Bus, kept: &[(SubDeviceKey, Option<u32>)]) -> Option<(Supervi
 /// The first scan, as soon as a SubDevice answers.
 pub(super) async fn scan_segment(bus: Bus, segment: SharedSegment, options: ScanOptions) {
     until_active(&segment, async {
-        let ended = scan(&bus, &options).await.map_err(|error| error.to_string());
+        let ended = scan(&bus, &segment, &options).await.map_err(|error| error.to_string());
         end_scan(&segment, ended);
         segment.observe_idle(IdleObservation::Scanned);
     })

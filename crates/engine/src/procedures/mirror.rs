@@ -8,7 +8,7 @@ use super::shared_segment::SharedSegment;
 use crate::segment::{Observation, StandbyObservation};
 use crate::supervisor::Bus;
 
-/// Interval of the look at the states.
+/// Interval at which the states are read.
 const EACH: Duration = Duration::from_millis(10);
 
 /// Passes the states that the cyclic half posts to the model, and refuses requests of the cyclic thread. Runs until the

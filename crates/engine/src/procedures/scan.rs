@@ -44,6 +44,7 @@ use super::dictionary::complete;
 use super::frame_limit::probe;
 use super::junction::learn;
 use super::services::ServiceError;
+use super::shared_segment::SharedSegment;
 use super::sii::program::SiiProgramError;
 use super::sii::{self, ChainEnd, SiiCache, SiiContents};
 use crate::config::duplicate_aliases;
@@ -75,7 +76,7 @@ const SIZE_AT: usize = 2 * 0x3E;
 ///
 /// While the count settles, present SubDevices are read already. Each SubDevice that appears later restarts the scan
 /// until the count has settled.
-pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scanned, ScanError> {
+pub async fn scan(bus: &Bus, segment: &SharedSegment, options: &ScanOptions) -> Result<Scanned, ScanError> {
     let begin = bus.now();
     let mut attempts = 1;
     bus.step(Subject::Scan, || "scan begins: SubDevices are counted".to_string());
@@ -86,7 +87,7 @@ pub async fn scan(bus: &Bus, options: &ScanOptions) -> Result<Scanned, ScanError
             let LinkCounts { main, redundant } = expected.by_link();
             format!("scan: {main} SubDevices on MAIN, {redundant} on REDUNDANT; they go to INIT and get addresses")
         });
-        expected = match attempt(bus, options, expected, &mut power_ons).await {
+        expected = match attempt((bus, segment), options, expected, &mut power_ons).await {
             Ok(mut scanned) => {
                 complete(bus, &mut scanned.scan, options.pdos).await;
                 return Ok(scanned);
@@ -138,7 +139,7 @@ impl<E: Into<ScanError>> From<E> for Failure {
 }
 
 async fn attempt(
-    bus: &Bus,
+    (bus, segment): (&Bus, &SharedSegment),
     options: &ScanOptions,
     expected: Count,
     power_ons: &mut PowerOns,
@@ -167,7 +168,7 @@ async fn attempt(
     let mut findings = findings_of(&scan);
     // Declared connections are not known yet.
     if options.junctions != JunctionMode::Strict {
-        let exact = options.enhanced_line_crossed && locate_crossings(bus, &mut scan).await;
+        let exact = options.enhanced_line_crossed && locate_crossings(bus, segment, &mut scan).await;
         findings.push(ScanFinding::Cabling(cabling_findings(bus, &scan, exact)));
     }
     findings.extend(closings.into_iter().map(ScanFinding::JunctionLearned));

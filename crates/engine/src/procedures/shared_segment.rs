@@ -16,15 +16,20 @@ use super::error_statistics::ErrorStatistics;
 use super::sii::{EepromTurns, SiiCache};
 use super::undeclared::UndeclaredMailboxes;
 use crate::board::Board;
+use crate::link::{Link, LinkOrder};
 use crate::mail::Mailbox;
 use crate::segment::clocks::{ClockFinding, ClockObservation, ClockVersions};
 use crate::segment::disturbance::{Disturbance, Wanted};
 use crate::segment::effect::{Effect, Task};
 use crate::segment::{
-    Addressed, IdleObservation, MemberFinding, Observation, PdoFinding, Segment, UndeclaredObservation, Words,
+    Addressed, IdleObservation, LinkObservation, MemberFinding, Observation, PdoFinding, Segment,
+    UndeclaredObservation, Words,
 };
 use crate::supervisor::{Bus, Posted, Signal};
 use crate::time::Instant;
+
+/// Time limit of the runtime for an order to the link layer.
+const LINK_LIMIT: Duration = Duration::from_secs(1);
 
 /// The model and its companions, shared by all procedures.
 #[derive(Clone, Debug)]
@@ -132,6 +137,7 @@ impl SharedSegment {
                 Effect::SuspendMailbox { index } => self.mailboxes.get(index).into_iter().for_each(Mailbox::suspend),
                 Effect::MainCount(count) => self.bus.set_main_count(count),
                 Effect::Occupants(occupants) => self.bus.set_occupants(occupants),
+                Effect::OrderLink(order) => self.bus.order_link(order),
                 Effect::Mailboxes(now) => self.undeclared.follow(&now),
                 Effect::Start(task) => self.tasks.borrow_mut().push_back(task),
             }
@@ -171,13 +177,7 @@ impl SharedSegment {
 
     /// The posted words, in the form that the model takes.
     pub(super) fn words(&self) -> Words {
-        Words {
-            links: self.bus.links(),
-            carriers: self.bus.carriers(),
-            ring: self.board.ring(),
-            supervision: self.board.supervision(),
-            cycles: self.board.cycles(),
-        }
+        Words::posted(&self.board, self.bus.links(), self.bus.carriers())
     }
 
     /// Passes to the model which SubDevices have got mail that has changed their PDOs since they were known: before
@@ -218,6 +218,16 @@ impl SharedSegment {
     /// The next procedure to be started.
     pub(super) async fn next_task(&self) -> Task {
         self.changed.until(|| self.tasks.borrow_mut().pop_front()).await
+    }
+
+    /// Disconnects or reconnects a link. False if the link layer cannot do that. The procedure that disconnected a link
+    /// must reconnect it. For one procedure at a time.
+    pub(super) async fn force_disconnect(&self, link: Link, disconnect: bool) -> bool {
+        self.observe(Observation::Link(LinkObservation::Ordered(LinkOrder { link, disconnect })));
+        let answered = self.until(Segment::link_answer);
+        let is_done = self.bus.within(LINK_LIMIT, answered).await.unwrap_or(false);
+        self.observe(Observation::Link(LinkObservation::Ended));
+        is_done
     }
 
     /// Waits until no other disturbance is under way, and then blocks others; `None` if that takes longer than the

@@ -32,7 +32,7 @@ pub(super) async fn supervise(bus: Bus, segment: SharedSegment) {
         let (posted, words, seen) = (bus.posted(), segment.words(), segment.view().observed());
         segment.observe(Observation::Words(words));
         let wake = segment.view().next_evaluation();
-        let number = words.supervision.map_or(0, |(number, _)| number);
+        let number = words.number().unwrap_or(0);
         let posted = posted.with_next_result(wake.with_result.then_some(number));
         let is_changed = || segment.view().observed() != seen;
         segment.until_posted(posted, wake.at, is_changed).await;
@@ -49,8 +49,7 @@ pub(super) async fn run_round(bus: Bus, segment: SharedSegment, routine: bool) {
     if round.counts {
         follow_up(&bus, &segment).await;
     }
-    let number = segment.board.supervision().map(|(number, _)| number);
-    segment.observe(Observation::RoundEnded(number));
+    segment.observe(Observation::RoundEnded(segment.words().number()));
 }
 
 async fn read_all(bus: &Bus, segment: &SharedSegment, routine: bool) {
@@ -61,7 +60,7 @@ async fn read_all(bus: &Bus, segment: &SharedSegment, routine: bool) {
     observe_states(segment, &settled, &unassigned);
     let others = unassigned.iter().filter(|(_, reading)| reading.is_answer()).count();
     let is_calm = || routine && segment.view().is_calm(&segment.words());
-    let counted = || segment.board.supervision().map(|(_, seen)| seen.total());
+    let counted = || segment.words().counted();
     let so_far = |readings: &[Reading]| {
         segment.observe(Observation::PartOfRound { versions, readings, others, counted: counted() });
     };

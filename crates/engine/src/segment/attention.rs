@@ -3,13 +3,10 @@
 
 use core::time::Duration;
 
-use ringcat_wire::register::EcatEvent;
-
 use super::disturbance::Disturbance;
 use super::effect::{Effects, Task};
-use super::ring::Words;
 use super::wake::Wake;
-use crate::board::{RingWord, Supervision};
+use super::words::{Reader, Words};
 use crate::ring::RingState;
 use crate::time::Instant;
 
@@ -17,11 +14,6 @@ use crate::time::Instant;
 const PAUSE: Duration = Duration::from_micros(500);
 /// Interval of rounds without a change: an OR can hide one state behind others.
 const ROUTINE: Duration = Duration::from_secs(1);
-/// A supervision result with a number this much higher than that at the end of a round was certainly sent after the
-/// round's reads.
-const SURELY_LATER: u32 = 8;
-/// Consecutive rounds because of an ECAT event request that stays set.
-const MOST_MISSED: u8 = 3;
 
 /// Result of the last round.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -61,15 +53,8 @@ enum Request {
 /// Triggers of a round.
 #[derive(Debug)]
 pub(super) struct Attention {
-    /// The words posted when the last round began.
-    seen: Supervision,
-    ring: RingWord,
-    /// The state of the ring reported by then.
+    /// The state of the ring that had been reported when the last round began.
     reported: RingState,
-    /// Number of the result at the end of the last round, and the number of rounds since then that were started only
-    /// because of missed requests.
-    checked: u32,
-    missed: u8,
     /// Other triggers.
     request: Request,
     next_routine: Instant,
@@ -85,11 +70,7 @@ pub(super) struct Attention {
 impl Default for Attention {
     fn default() -> Attention {
         Attention {
-            seen: Supervision::default(),
-            ring: RingWord::default(),
             reported: RingState::Unknown,
-            checked: 0,
-            missed: 0,
             request: Request::Nothing,
             next_routine: Instant::default(),
             reads: Reads::Resting(Instant::default()),
@@ -101,35 +82,15 @@ impl Default for Attention {
 }
 
 impl Attention {
-    /// A word differs from its value at the start of the last round.
-    pub fn has_changed(&self, words: &Words, reported: RingState) -> bool {
-        words.supervision.is_some_and(|(_, supervision)| supervision != self.seen)
-            || words.ring != self.ring
-            || reported != self.reported
-            || self.request == Request::Now
-    }
-
-    /// Ports have changed again directly after a round that cleared their ECAT event: the event is set again, as before
-    /// the round. `None` if that is impossible.
-    fn has_missed(&mut self, words: &Words) -> Option<bool> {
-        let (number, supervision) = words.supervision?;
-        if !EcatEvent::from_bits(supervision.irq).dl_status {
-            self.missed = 0;
-            return None;
-        }
-        // Events of SubDevices that are not read stay set for ever.
-        if self.missed >= MOST_MISSED {
-            return None;
-        }
-        let is_missed = number.wrapping_sub(self.checked) >= SURELY_LATER;
-        self.missed += u8::from(is_missed);
-        Some(is_missed)
+    /// Something differs from when the last round began, or a round is requested.
+    pub fn has_changed(&self, reader: &Reader, words: &Words, reported: RingState) -> bool {
+        reader.round.has_changed(words) || reported != self.reported || self.request == Request::Now
     }
 
     /// Starts a round if it is requested. Returns the next evaluation if no words are posted before.
     pub fn observe(
         &mut self,
-        words: &Words,
+        (reader, words): (&mut Reader, &Words),
         reported: RingState,
         disturbance: Option<Disturbance>,
         now: Instant,
@@ -144,15 +105,14 @@ impl Attention {
         if now < earliest {
             return Wake::at(earliest);
         }
-        let missed = self.has_missed(words);
-        let changed = self.has_changed(words, reported) || missed == Some(true);
+        let missed = reader.round.has_missed(words);
+        let changed = self.has_changed(reader, words, reported) || missed == Some(true);
         if !changed && now < self.next_routine {
             return Wake { at: self.next_routine, with_result: missed.is_some() };
         }
         effects.start(Task::Round { routine: !changed && self.request == Request::Nothing });
         (self.reads, self.request) = (Reads::UnderWay, Request::Nothing);
-        self.seen = words.supervision.map_or(self.seen, |(_, supervision)| supervision);
-        self.ring = words.ring;
+        reader.round.begin(words);
         self.reported = reported;
         self.next_routine = now + ROUTINE;
         Wake::NEVER
@@ -174,9 +134,8 @@ impl Attention {
         self.next_routine = self.next_routine.min(now + pause);
     }
 
-    /// A round has ended; `number` is the latest result's.
-    pub fn end(&mut self, number: Option<u32>, now: Instant) {
+    /// A round has ended.
+    pub fn end(&mut self, now: Instant) {
         self.reads = Reads::Resting(now + PAUSE);
-        self.checked = number.unwrap_or(0);
     }
 }

@@ -11,6 +11,7 @@ use super::key::SubDeviceKey;
 use super::start::Start;
 use crate::declared::SubDeviceId;
 use crate::event::Event;
+use crate::link::LinkOrder;
 use crate::ring_status::Occupant;
 
 /// AL status and code of a SubDevice.
@@ -34,6 +35,8 @@ pub enum Effect {
     MainCount(u16),
     /// The SubDevices at the positions of the cabling have changed.
     Occupants(Vec<Occupant>),
+    /// An order waits for the link layer; none does any more with `None`.
+    OrderLink(Option<LinkOrder>),
     /// A procedure is to be started.
     Start(Task),
 }

@@ -78,14 +78,10 @@ pub(super) struct Idle {
     pub silent: u8,
     /// The procedure that works on the segment.
     pub work: Work,
-    /// SubDevices on each link as they were reported, or found, last.
-    pub counted: Option<LinkCounts>,
     /// Changes that broadcasts have shown, also while a procedure works.
     pub changes: u32,
     /// Former station addresses of SubDevices that the scan under way has given others.
     pub readdressed: Vec<StationAddress>,
-    /// The unexpected OR of the states for which all states were read last.
-    pub read_for: Option<u8>,
     pub rescans: Rescans,
 }
 

@@ -12,7 +12,6 @@ use super::attention::{Attention, Round};
 use super::breaks::Breaks;
 use super::cable_watch::CableWatch;
 use super::cabling::Cabling;
-use super::changes::{Changes, Compared};
 use super::choices::Choices;
 use super::clocks::{ClockVersions, Clocks};
 use super::crossings::{Crossings, LineCheck};
@@ -20,10 +19,11 @@ use super::disturbance::{Disturbance, Slot};
 use super::hot_connect::HotConnect;
 use super::idle::Idle;
 use super::key::SubDeviceKey;
+use super::link_order::LinkControl;
 use super::local_rings::LocalRings;
 use super::member::MemberView;
 use super::port_control::{BlockedPort, PortControl};
-use super::ring::{Ring, Words};
+use super::ring::Ring;
 use super::scan::Found;
 use super::silence::Silence;
 use super::stage::Stage;
@@ -32,6 +32,7 @@ use super::unassigned::UnassignedView;
 use super::undeclared::Keeping;
 use super::versions::Versions;
 use super::wake::Wake;
+use super::words::{Changes, Reader, Words};
 use crate::board::Board;
 use crate::board::clocks::References;
 use crate::clocks::KnownClocks;
@@ -78,10 +79,10 @@ impl Default for Declared {
 #[derive(Debug)]
 pub struct Segment {
     pub(super) stage: Stage,
-    /// Observations so far but those of words and clocks, which supervision need not follow.
+    /// Observations so far but those of words, clocks and orders, which supervision need not follow.
     pub(super) observed: u32,
-    /// Changes that posted words have shown.
-    pub(super) compared: Compared,
+    /// What posted words are compared with.
+    pub(super) words: Reader,
     /// The SubDevices that were found, and those that are declared and absent.
     pub(super) subdevices: SubDevices,
     /// Number of the first attempts to configure the members: findings of an earlier application are refused.
@@ -111,6 +112,8 @@ pub struct Segment {
     pub(super) hot_connect: HotConnect,
     pub(super) attention: Attention,
     pub(super) slot: Slot,
+    /// The link that is down on purpose.
+    pub(super) link_control: LinkControl,
     pub(super) addresses: Addresses,
     pub(super) keeping: Keeping,
     pub(super) idle: Idle,
@@ -132,7 +135,7 @@ impl Segment {
         Segment {
             stage: Stage::default(),
             observed: 0,
-            compared: Compared::default(),
+            words: Reader::default(),
             ring: Ring::new(ring, carriers),
             breaks: Breaks::default(),
             cable_watches: (0, Vec::new()),
@@ -142,6 +145,7 @@ impl Segment {
             hot_connect: HotConnect::new(&subdevices, choices.follow_groups),
             attention: Attention::default(),
             slot: Slot::default(),
+            link_control: LinkControl::default(),
             addresses: Addresses::default(),
             keeping: Keeping::default(),
             idle: Idle::default(),
@@ -178,7 +182,7 @@ impl Segment {
 
     /// Changes of the segment that posted words have shown since the application began.
     pub fn changes(&self) -> Changes {
-        self.compared.changes
+        self.words.before.changes
     }
 
     /// Number of observations that supervision has to follow; it changes with each.
@@ -271,6 +275,11 @@ impl Segment {
         self.slot.running()
     }
 
+    /// The answer of the link layer to the order that a procedure has given.
+    pub fn link_answer(&self) -> Option<bool> {
+        self.link_control.answer()
+    }
+
     /// Whether the disturbance with this number is under way.
     pub fn is_granted(&self, number: u32) -> bool {
         self.slot.is_granted(number)
@@ -333,7 +342,7 @@ impl Segment {
 
     /// Whether nothing has changed since the last round began.
     pub fn is_calm(&self, words: &Words) -> bool {
-        !self.attention.has_changed(words, self.ring.reported())
+        !self.attention.has_changed(&self.words, words, self.ring.reported())
     }
 
     /// Crossed lines as reported.

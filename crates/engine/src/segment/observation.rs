@@ -19,17 +19,18 @@ use super::findings::{DeclarationFinding, ScanFinding};
 use super::given::Given;
 use super::idle::IdleObservation;
 use super::key::SubDeviceKey;
+use super::link_order::LinkObservation;
 use super::model::Declared;
 use super::pdo_finding::PdoFinding;
 use super::port_control::BlockedPort;
 use super::reading::Reading;
-use super::ring::Words;
 use super::round_result::RoundResult;
 use super::scan::{Found, Scan};
 use super::seen::Seen;
 use super::undeclared::UndeclaredObservation;
 use super::versions::Versions;
 use super::view::View;
+use super::words::Words;
 #[cfg(feature = "standby")]
 use crate::board::live::Life;
 use crate::declared::Move;
@@ -125,6 +126,8 @@ pub enum MemberFinding<'a> {
 pub enum Observation<'a> {
     /// Words posted by the exchange, or without an application the answer to a broadcast, and carriers of the links.
     Words(Words),
+    /// The course of an order to the link layer.
+    Link(LinkObservation),
     /// Observations without an application.
     Idle(IdleObservation<'a>),
     /// Intermediate result of a round of reads. `others`: answers of SubDevices without a declaration.

@@ -3,6 +3,7 @@
 mod addressed;
 mod clocks;
 mod idle;
+mod posted;
 mod stages;
 mod stale;
 mod undeclared;
@@ -19,6 +20,7 @@ use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::register::{DlStatus, PortKind};
 use ringcat_wire::sii::Identity;
 
+use self::posted::Posted;
 use super::clocks::Clocks;
 use super::disturbance::{Disturbance, Wanted};
 use super::effect::{Check, Effect, Effects, Shown, Task};
@@ -52,7 +54,7 @@ const QUIET: Duration = Duration::from_millis(50);
 /// A closed ring of `n` SubDevices, all of them members in OP.
 struct Ring {
     segment: Segment,
-    words: Words,
+    words: Posted,
     now: Instant,
 }
 
@@ -141,7 +143,7 @@ impl Ring {
         segment.observe(Observation::ScanEnded(Ok(scan)), Instant(0));
         segment.observe(Observation::Activated(Box::new(declared)), Instant(0));
         let counts = Supervision { main: Wkc(count as u16), al_status: [8, 0], ..Supervision::default() };
-        let words = Words {
+        let words = Posted {
             links: LinkSet::Ring,
             carriers: [Some(true); 2],
             ring: RingWord { state: RingState::Closed, changes: 1, ..RingWord::default() },
@@ -175,7 +177,7 @@ impl Ring {
             *number += 1;
         }
         self.words.cycles += 1;
-        let words = self.words;
+        let words = self.words.words();
         self.observe(Observation::Words(words))
     }
 
@@ -397,7 +399,7 @@ fn without_changes_the_model_sleeps_until_the_next_routine_scan() {
 
 /// Evaluates the same words whenever the model asks for it, for a second; returns how often. Rounds end at once.
 fn evaluations_without_news(ring: &mut Ring, high: &[u8]) -> usize {
-    let (words, end) = (ring.words, ring.now + Duration::from_secs(1));
+    let (words, end) = (ring.words.words(), ring.now + Duration::from_secs(1));
     let mut count = 0;
     loop {
         let effects = ring.observe(Observation::Words(words));

@@ -1,7 +1,6 @@
 //! The interface of procedures: send datagrams, wait, start other procedures, report events.
 
 mod future;
-mod link;
 mod mail;
 mod registers;
 mod wait;
@@ -27,7 +26,7 @@ use super::transfer::Request;
 use crate::board::Board;
 use crate::event::history::History;
 use crate::event::{Event, Notice, Occupant, Subject};
-use crate::link::LinkSet;
+use crate::link::{LinkOrder, LinkSet};
 use crate::ring::RingState;
 use crate::role::{Function, NotPermitted};
 use crate::time::Instant;
@@ -159,6 +158,11 @@ impl Bus {
     ) -> impl Future<Output = Result<Reply, BusError>> {
         let resend = !matches!(command, Command::Aprw | Command::Fprw | Command::Brw | Command::Lrw);
         self.submit(Request { expected, resend, ..Request::once(command, target, data) })
+    }
+
+    /// Leaves an order to the link layer for the runtime; none with `None`.
+    pub(crate) fn order_link(&self, order: Option<LinkOrder>) {
+        self.shared.borrow_mut().link_order = order;
     }
 
     /// Number of SubDevices on the main link: higher positions are on the redundant link (protocol CR-09). Broadcasts

@@ -11,7 +11,6 @@ use super::command_reports::{CommandReports, WrongCommand};
 use super::counters::AcyclicCounters;
 use super::debug_message::DebugMessages;
 use super::flights::Flights;
-use super::link_order::LinkOrder;
 use super::outbox::{Outbox, Rank};
 use super::posted::Watchers;
 use super::reply::BusError;
@@ -23,7 +22,7 @@ use super::transfer::{Request, Stage, Transfer, TransferId, Transfers};
 use crate::bell::Bell;
 use crate::board::Board;
 use crate::event::{Event, EventLog, Occupant};
-use crate::link::LinkSet;
+use crate::link::{LinkOrder, LinkSet};
 use crate::ring::{Identity, RingMonitor};
 use crate::role::RoleControl;
 use crate::time::Instant;
@@ -52,9 +51,8 @@ pub(crate) struct Shared {
     pub(crate) main_count: u16,
     /// The first datagram of the outbox and since when it waits, if it is too long for the send window.
     pub(crate) blocked: Option<(TransferId, Instant)>,
-    pub(crate) link_order: LinkOrder,
-    /// The procedure that waits for its answer.
-    pub(crate) awaits_link: Option<TaskId>,
+    /// The order to the link layer that waits for the runtime.
+    pub(crate) link_order: Option<LinkOrder>,
     pub(super) watchers: Watchers,
     pub(super) bell: Bell,
     /// Largest number of datagrams in a frame.
@@ -88,8 +86,7 @@ impl Shared {
             round_trip: RoundTrip::default(),
             main_count: 0,
             blocked: None,
-            link_order: LinkOrder::default(),
-            awaits_link: None,
+            link_order: None,
             watchers: Watchers::default(),
             bell: Bell::default(),
             max_datagrams: usize::MAX,
@@ -156,7 +153,7 @@ impl Shared {
 
     /// Whether there is work that does not wait for a time: a datagram to send, or a request to the link layer.
     pub(super) fn has_work(&self) -> bool {
-        matches!(self.link_order, LinkOrder::Given { .. }) || self.wants_to_send()
+        self.link_order.is_some() || self.wants_to_send()
     }
 
     pub(crate) fn wants_to_send(&self) -> bool {

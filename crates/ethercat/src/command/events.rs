@@ -37,7 +37,7 @@ number of its master. Not a command of IgH.
 /// Events of a master that were shown.
 struct Shown {
     master: u32,
-    /// It was driven when it was asked last. The standard error tells once that it is not.
+    /// It was driven when it was asked last. A line on the standard error reports once that it no longer is.
     is_driven: bool,
     /// Number of the next one.
     next: u64,

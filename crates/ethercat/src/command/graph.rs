@@ -16,7 +16,7 @@ use crate::shape::{Command, Output};
 const EBUS: u8 = 2;
 const MII: u8 = 3;
 
-/// What the graph tells beside the slaves.
+/// What the graph shows besides the slaves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum More {
     Nothing,

@@ -96,7 +96,7 @@ pub(super) fn data_type(
     let asked = session.tool(master, ToolQuery::Entry { position, index, sub_index });
     let entry = match asked {
         Ok(ToolAnswer::Entry(entry)) => entry,
-        // It was answered that the dictionary does not tell; other failures are those of the daemon.
+        // The dictionary does not describe the object; other failures are those of the daemon.
         Err(failure) if failure.fault().is_none() => return Err(failure),
         _ => return Err(Failure::failed("Failed to determine SDO entry data type. Please specify --type.")),
     };

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::values::Link;
 use crate::hex;
 
-/// Seconds over which rates are told.
+/// Seconds over which rates are measured.
 pub const SECONDS: [u32; 3] = [1, 10, 60];
 
 /// A master.

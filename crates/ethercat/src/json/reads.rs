@@ -8,7 +8,7 @@ use crate::data_types::{DataType, Scalar};
 use crate::failure::Failure;
 use crate::sii_image::{Category as Found, category_name};
 
-/// A value as its data type tells it.
+/// A value in the form of its data type.
 pub struct Value<'a> {
     /// Name of the data type.
     pub data_type: Option<&'static str>,

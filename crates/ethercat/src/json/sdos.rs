@@ -27,7 +27,7 @@ pub struct Sdos<'a> {
 pub struct Object<'a> {
     /// Index of the object
     pub index: u16,
-    /// Its name, as the SubDevice tells it
+    /// Its name, as the SubDevice describes it
     pub name: &'a str,
     /// Its entries; null with --quiet
     pub entries: Option<List<'a, EntryLine, (), Entry<'a>>>,
@@ -49,7 +49,7 @@ pub struct Entry<'a> {
     pub read_in: Bits,
     /// States in which it can be written
     pub write_in: Bits,
-    /// Its name, as the SubDevice tells it
+    /// Its name, as the SubDevice describes it
     pub name: &'a str,
 }
 

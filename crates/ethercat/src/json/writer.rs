@@ -26,7 +26,7 @@ impl Error for Unsupported {
     }
 }
 
-/// This many digits tell every number of 64 bits.
+/// This many digits identify every number of 64 bits.
 const MOST_DIGITS: usize = 17;
 
 /// A text of JSON that grows.
@@ -82,9 +82,10 @@ impl Writer {
         _ = write!(self.text, "{value}");
     }
 
-    /// A number with the fewest digits of which `is_told` says that they tell it; JSON has no others than finite ones.
+    /// A number with the fewest digits that `is_exact` accepts: read back, they give the number. JSON has finite ones
+    /// only.
     /// The standard library has code of its own for this, which nothing else of the tool needs.
-    fn float(&mut self, value: f64, is_told: &dyn Fn(&str) -> bool) {
+    fn float(&mut self, value: f64, is_exact: &dyn Fn(&str) -> bool) {
         if !value.is_finite() {
             return self.text.push_str("null");
         }
@@ -92,7 +93,7 @@ impl Writer {
         for digits in 0..MOST_DIGITS {
             self.text.truncate(begin);
             _ = write!(self.text, "{value:.digits$e}");
-            if is_told(&self.text[begin..]) {
+            if is_exact(&self.text[begin..]) {
                 break;
             }
         }

@@ -268,7 +268,7 @@ impl Driver {
         let counted = counts.clone();
         let body = move || {
             let mut bus = OwnedBus::take(&socket, 0, "application", &Options::default(), || ()).expect("it is free");
-            let found = bus.supervisor().with(|engine| engine.subdevices()).expect("it runs");
+            let found = bus.supervisor().subdevices().expect("it runs");
             let links = bus.take_links().expect("they are unused");
             let activated = bus.supervisor().clone().activate(declare(&found), links);
             let mut application = activated.expect("it fits the scan");

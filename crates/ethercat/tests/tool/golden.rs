@@ -91,7 +91,7 @@ fn expected(place: &Path, name: &str) -> Done {
     let read = |suffix: &str| fs::read(place.join(format!("{name}.{suffix}"))).unwrap_or_default();
     let bytes = read("out");
     let errors = String::from_utf8_lossy(&read("err")).into_owned();
-    // The original ran beside a stand-in that told what it was asked.
+    // The original ran beside a stand-in that reported what it was asked.
     let err = errors.lines().filter(|line| !line.starts_with("[shim]")).map(|line| format!("{line}\n")).collect();
     let code = String::from_utf8_lossy(&read("rc")).trim().parse().ok();
     Done { out: String::from_utf8_lossy(&bytes).into_owned(), bytes, err, code }

@@ -252,7 +252,7 @@ fn ip_parameters_are_set_where_the_slave_speaks_ethernet() {
         let mailbox = engine.mailbox(ringcat::wire::address::Position(0)).expect("it has one");
         async move { eoe::read_ip(&mailbox, 0, Limits::new(LONG, LONG)).await }
     });
-    let ip = read.expect("it runs").expect("it is told");
+    let ip = read.expect("it runs").expect("it is reported");
     assert_eq!((ip.address, ip.mask), (Some([10, 0, 0, 7].into()), Some([255, 255, 255, 0].into())));
     assert_eq!(ip.mac, Some([2, 0, 0, 0, 0, 7]));
     // Interfaces are those of the application; these lead nowhere.

@@ -261,9 +261,9 @@ fn events_are_followed_one_object_per_line_as_they_come() {
         let fault = if is_cut { Fault::Cut(CableId(1)) } else { Fault::Heal(CableId(1)) };
         bench.inside(0, move |segment| segment.network_mut().apply(fault));
     };
-    let told = |line: &Value, text: &str| line["text"].as_str().is_some_and(|it| it.contains(text));
+    let reports = |line: &Value, text: &str| line["text"].as_str().is_some_and(|it| it.contains(text));
     cut(true);
-    bench.wait_until("the cut", || bench.json(&["events"]).iter().any(|line| told(line, "ring open")));
+    bench.wait_until("the cut", || bench.json(&["events"]).iter().any(|line| reports(line, "ring open")));
     let listed = bench.json(&["events"]);
     assert!(listed.is_sorted_by_key(|line| line["time_ns"].as_u64()) && listed[0]["master"] == 0, "{listed:?}");
     assert!(listed.windows(2).all(|two| two[1]["number"].as_u64() > two[0]["number"].as_u64()), "{listed:?}");
@@ -277,7 +277,7 @@ fn events_are_followed_one_object_per_line_as_they_come() {
     let wait_for = |text: &str| {
         loop {
             let line = received.recv_timeout(LONG).unwrap_or_else(|error| panic!("{text}: {error}"));
-            if told(&lines("events", &line)[0], text) {
+            if reports(&lines("events", &line)[0], text) {
                 break;
             }
         }

@@ -29,8 +29,8 @@ fn a_program_with_too_little_memory_to_lock_is_told_which_limit_to_set() {
     let Some(hosts) = program(&here().join("tests/c/hosts.c"), &[]) else { return };
     for mib in ["1", "2", "3", "4", "5"] {
         let (said, reported, status) = outputs(&hosts, &here().join("tests/c/services.toml"), &["locked", mib]);
-        let is_told = reported.contains("expected a limit of 16384 KiB at least") && status.code() == Some(1);
-        assert!(status.success() || is_told, "{mib} MiB: {status}\n{said}\n{reported}");
+        let is_reported = reported.contains("expected a limit of 16384 KiB at least") && status.code() == Some(1);
+        assert!(status.success() || is_reported, "{mib} MiB: {status}\n{said}\n{reported}");
         println!("{mib} MiB: {status}");
     }
 }

@@ -1,4 +1,4 @@
-//! A program whose bus the daemon takes back is told.
+//! A program whose bus the daemon takes back is reported.
 
 use std::io::Read;
 use std::process::{Command, Stdio};

@@ -41,7 +41,7 @@ pub struct Settings {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum NoAnswer {
-    /// It does not have such a setting, or does not tell.
+    /// It does not have such a setting, or does not report it.
     NotSupported,
     /// Another error of the kernel.
     Failed(i32),

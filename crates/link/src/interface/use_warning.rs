@@ -159,7 +159,7 @@ fn read(path: &str) -> String {
     fs::read_to_string(path).unwrap_or_default()
 }
 
-/// Addresses of an interface; `None` if the kernel does not tell.
+/// Addresses of an interface; `None` if the kernel does not list them.
 fn addresses(name: &str) -> Option<Vec<IpAddr>> {
     let mut found = Vec::new();
     let mut list: *mut libc::ifaddrs = std::ptr::null_mut();

@@ -1,4 +1,4 @@
-//! The thread that receives what the daemon says to an owner, and tells it what the owner knows and needs.
+//! The thread that receives messages of the daemon to an owner, and sends what the owner knows and needs.
 
 use std::os::fd::{AsFd, OwnedFd};
 use std::sync::Arc;

@@ -88,7 +88,7 @@ fn finished(done: Result<(), Error>) -> Answered {
 /// Requests a state; it goes on without the client.
 fn start_state(supervisor: &SupervisorThread, position: u16, state: u8) -> Answered {
     let state = AlState::from_code(state).ok_or_else(|| expected("a state: 1, 2, 3, 4 or 8"))?;
-    let begun = supervisor.with(move |engine| {
+    let begun = supervisor.act(move |engine| {
         let requested = engine.start_state_request(Position(position), state);
         engine.spawn(async move {
             // An event tells of its failure.
@@ -104,7 +104,7 @@ fn write_urgently(supervisor: &SupervisorThread, position: u16, address: u16, by
         return Err(expected(&format!("1 to {MOST_REGISTERS} bytes of registers, not {}", bytes.len())));
     }
     let register = RegisterAddress(address);
-    let is_known = supervisor.with(move |engine| engine.station(Position(position)).is_some());
+    let is_known = supervisor.act(move |engine| engine.station(Position(position)).is_some());
     if is_known.map_err(|error| refusal(&error))? {
         return finished(subdevice(supervisor, position).register_write_urgently(register, bytes));
     }
@@ -122,7 +122,7 @@ fn set_ip(supervisor: &SupervisorThread, position: u16, ip: IpParameters) -> Ans
     let settings = IpSettings::default().with_mac(mac).with_address(address).with_mask(mask);
     let settings = settings.with_gateway(gateway).with_dns(dns).with_name(name);
     let limits = TransferLimits::default().of_message();
-    let set = supervisor.run(move |engine| {
+    let set = supervisor.start_procedure(move |engine| {
         let mailbox = engine.mailbox(Position(position));
         async move {
             match mailbox {
@@ -133,7 +133,7 @@ fn set_ip(supervisor: &SupervisorThread, position: u16, ip: IpParameters) -> Ans
             }
         }
     });
-    match set {
+    match set.wait() {
         Ok(Ok(())) => Ok((Answer::Done, Vec::new())),
         Ok(Err(text)) => Err(Refusal::Failed(text)),
         Err(error) => Err(refusal(&error)),

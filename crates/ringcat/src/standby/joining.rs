@@ -79,12 +79,12 @@ impl Joining {
 impl<L: Links> MainDevice<L> {
     /// The role, and requests for another one, for any thread.
     pub fn role_control(&self) -> RoleControl {
-        self.engine().role_control()
+        self.engine.role_control()
     }
 
     /// What was heard of the ACTIVE so far.
     pub fn heard(&self) -> Heard {
-        self.engine().heard()
+        self.engine.heard()
     }
 
     /// Frames that were forwarded so far.
@@ -103,7 +103,7 @@ impl<L: Links> MainDevice<L> {
         let end = self.now() + time;
         while !self.heard().is_known && self.now() < end {
             self.work();
-            let wake = self.engine().next_deadline().unwrap_or(end);
+            let wake = self.engine.next_deadline().unwrap_or(end);
             self.links.wait(wake.min(end));
         }
         Ok(self.heard())
@@ -126,8 +126,8 @@ impl<L: Links> MainDevice<L> {
         mut self,
         declare: impl FnOnce(&Scan) -> Declaration,
     ) -> Result<Application<L>, Box<Refused<MainDevice<L>>>> {
-        let known = self.engine().heard_knowledge().zip(self.engine().heard_configuration());
-        let Some(((knowledge, (session, _)), scan)) = known.zip(self.engine().heard_scan()) else {
+        let known = self.engine.heard_knowledge().zip(self.engine.heard_configuration());
+        let Some(((knowledge, (session, _)), scan)) = known.zip(self.engine.heard_scan()) else {
             let error = ActivateError::NoScan.into();
             return Err(Box::new(Refused { error, main_device: self }));
         };

@@ -39,7 +39,7 @@ impl SupervisorThread {
     /// # Errors
     /// As [`crate::MainDevice::resume`].
     pub fn resume(&self, knowledge: Knowledge, handover: Handover) -> Result<Scan, Error> {
-        self.with(move |engine| engine.resume(knowledge, handover))??;
+        self.act(move |engine| engine.resume(knowledge, handover))??;
         Ok(self.ask(|engine| engine.scan_result()).wait()??)
     }
 
@@ -48,7 +48,7 @@ impl SupervisorThread {
     /// # Errors
     /// The thread has ended.
     pub fn knowledge(&self) -> Result<Option<Knowledge>, Error> {
-        self.with(|engine| engine.knowledge())
+        self.act(|engine| engine.knowledge())
     }
 
     /// Ends the thread without a further frame, and returns what is known of the segment, for another process that goes
@@ -58,7 +58,7 @@ impl SupervisorThread {
     /// The thread has ended.
     pub fn hand_over(&self) -> Result<Option<Knowledge>, Error> {
         let published = self.0.published.clone();
-        self.with(move |engine| {
+        self.act(move |engine| {
             published.is_handed_over.store(true, Ordering::Release);
             engine.knowledge()
         })

@@ -37,7 +37,7 @@ impl SupervisorThread {
     /// # Errors
     /// The thread has ended.
     pub fn role_control(&self) -> Result<RoleControl, Error> {
-        self.with(|engine| engine.role_control())
+        self.act(|engine| engine.role_control())
     }
 
     /// Takes the role that is free, as [`MainDevice::join`](crate::MainDevice::join). Cycles use `links`, on which the
@@ -53,7 +53,7 @@ impl SupervisorThread {
         links: C,
     ) -> Activated<C> {
         let has_ring = links.addresses().redundant.is_some();
-        let listener = self.with(|engine| engine.split_listener()).map(|it| it.filter(|_| has_ring));
+        let listener = self.act(|engine| engine.split_listener()).map(|it| it.filter(|_| has_ring));
         let listener = match listener {
             Ok(Some(listener)) => listener,
             other => {
@@ -82,7 +82,7 @@ impl SupervisorThread {
 
     /// Becomes ACTIVE without an application.
     fn become_active(&self) -> Result<(), Error> {
-        self.with(|engine| {
+        self.act(|engine| {
             engine.role_control().request(RoleRequest::Active);
             engine.poll(engine.bus().now());
         })

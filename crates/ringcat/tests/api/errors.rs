@@ -27,9 +27,11 @@ fn happened() -> Result<Vec<Box<dyn StdError>>, Box<dyn StdError>> {
     device.scan()?;
     let mut at = |position: u16| device.subdevice(Position(position)).sdo_read::<u32>(0x7777, 0).expect_err("refused");
     all.extend([0, 1, 9].map(|position| Box::new(at(position)) as Box<dyn StdError>));
-    let speaker = || Position(1);
-    all.push(Box::new(device.subdevice(speaker()).foe_read("missing").expect_err("no such file")));
-    all.push(Box::new(device.subdevice(speaker()).register_write(map::SII_CONTROL, vec![0; 5_000]).expect_err("long")));
+    let mailbox_device = || Position(1);
+    all.push(Box::new(device.subdevice(mailbox_device()).foe_read("missing").expect_err("no such file")));
+    all.push(Box::new(
+        device.subdevice(mailbox_device()).register_write(map::SII_CONTROL, vec![0; 5_000]).expect_err("long"),
+    ));
     let mut wrong = Declaration::new(Duration::from_millis(1));
     wrong.add(SubDeviceConfig::at_position(0).expect_product(1, 2));
     all.push(device.activate(wrong).expect_err("another product"));

@@ -185,9 +185,12 @@ fn an_interface_that_cannot_be_created_is_reported_once_and_all_else_continues()
     let cycles = cycles(&supervisor, cyclic)?;
     wait("all are in OP", || cycles.supervisor().all_settled());
     sleep(Duration::from_millis(100));
-    let told: Vec<String> = ethernet.take_events().iter().map(ToString::to_string).collect();
-    assert_eq!(told.len(), 2, "{told:?}");
-    assert!(told[0].starts_with("EoE: not permitted to make the network interface eoe3s1; run as root"), "{told:?}");
+    let reports: Vec<String> = ethernet.take_events().iter().map(ToString::to_string).collect();
+    assert_eq!(reports.len(), 2, "{reports:?}");
+    assert!(
+        reports[0].starts_with("EoE: not permitted to make the network interface eoe3s1; run as root"),
+        "{reports:?}"
+    );
     assert_eq!(ethernet.interfaces(), []);
     Ok(())
 }

@@ -79,9 +79,9 @@ impl Bench {
     /// Our own traffic works.
     fn own_traffic(&self, value: u16) {
         let supervisor = self.cycles.supervisor();
-        let speaker = supervisor.subdevice(SubDeviceId(ALL)).limits(TRANSFER);
-        speaker.sdo_write(NUMBER, 200, value).expect("it can be written");
-        assert_eq!(speaker.sdo_read::<u16>(NUMBER, 200).expect("it can be read"), value);
+        let mailbox_device = supervisor.subdevice(SubDeviceId(ALL)).limits(TRANSFER);
+        mailbox_device.sdo_write(NUMBER, 200, value).expect("it can be written");
+        assert_eq!(mailbox_device.sdo_read::<u16>(NUMBER, 200).expect("it can be read"), value);
     }
 }
 
@@ -270,8 +270,9 @@ fn several_clients_and_our_own_traffic_share_a_mailbox_and_none_disturbs_another
         });
         for round in 0..5 {
             bench.own_traffic(0x5A00 + round);
-            let speaker = bench.cycles.supervisor().subdevice(SubDeviceId(ALL)).limits(TRANSFER.with_bytes(200_000));
-            let large = speaker.sdo_read::<Vec<u8>>(LARGE, 0);
+            let mailbox_device =
+                bench.cycles.supervisor().subdevice(SubDeviceId(ALL)).limits(TRANSFER.with_bytes(200_000));
+            let large = mailbox_device.sdo_read::<Vec<u8>>(LARGE, 0);
             assert_eq!(large.expect("no other message is in this transfer").len(), 100_000);
         }
     });

@@ -93,8 +93,8 @@ fn one_service_works_before_activation_beside_cycles_and_from_any_thread() -> Re
 fn a_job_is_waited_for_with_a_limit_polled_and_awaited() -> Result<(), Error> {
     let (supervisor, _cyclic) = supervisor()?;
     supervisor.scan()?;
-    let speaker = supervisor.background().subdevice(Position(1)).limits(TRANSFER.with_bytes(200_000));
-    let start = || speaker.sdo_read::<Vec<u8>>(LARGE, 0);
+    let mailbox_device = supervisor.background().subdevice(Position(1)).limits(TRANSFER.with_bytes(200_000));
+    let start = || mailbox_device.sdo_read::<Vec<u8>>(LARGE, 0);
 
     let mut limited = start();
     assert!(limited.wait_for(Duration::ZERO).is_none(), "segments take time");
@@ -130,8 +130,8 @@ fn a_stop_ends_jobs_and_an_abort_leaves_the_mailbox_free() -> Result<(), Error> 
         std::thread::sleep(Duration::from_millis(1));
     }
     let supervisor = cycles.supervisor().clone();
-    let speaker = supervisor.background().subdevice(SPEAKER).limits(TRANSFER.with_bytes(200_000));
-    let start = || speaker.sdo_read::<Vec<u8>>(LARGE, 0);
+    let mailbox_device = supervisor.background().subdevice(SPEAKER).limits(TRANSFER.with_bytes(200_000));
+    let start = || mailbox_device.sdo_read::<Vec<u8>>(LARGE, 0);
     start().abort()?;
     drop(start());
     assert_eq!(supervisor.subdevice(SPEAKER).sdo_read::<Vec<u8>>(0x2001, 7)?.len(), 2);

@@ -34,7 +34,7 @@ fn scanned() -> Result<Bus, Error> {
     Ok(main_device)
 }
 
-fn speaker(bus: &mut Bus) -> SubDevice<&mut Bus> {
+fn mailbox_device(bus: &mut Bus) -> SubDevice<&mut Bus> {
     bus.subdevice(SPEAKER)
 }
 
@@ -79,9 +79,9 @@ fn pdos_are_assigned_mapped_and_transferred_by_mailbox() -> Result<(), Box<dyn S
 #[test]
 fn lengths_of_the_object_lists_are_those_of_the_lists() -> Result<(), Box<dyn StdError>> {
     let mut bus = scanned()?;
-    let lengths = speaker(&mut bus).sdo_list_lengths()?;
+    let lengths = mailbox_device(&mut bus).sdo_list_lengths()?;
     for list in ListType::LISTS {
-        let objects = speaker(&mut bus).sdo_list(list)?;
+        let objects = mailbox_device(&mut bus).sdo_list(list)?;
         assert_eq!(lengths.of(list).map(usize::from), Some(objects.len()), "{list}");
     }
     assert_eq!(lengths.of(ListType::Lengths), None);
@@ -131,15 +131,15 @@ impl Source for Sevens {
 fn large_objects_and_files_pass_piece_by_piece() -> Result<(), Box<dyn StdError>> {
     let mut bus = scanned()?;
     let object = SdoAddress::new(0x2002, 0);
-    let before = speaker(&mut bus).sdo_read::<Vec<u8>>(0x2002, 0)?;
-    speaker(&mut bus).sdo_write_from(object, Sevens(before.len() as u64))?;
-    let sum = speaker(&mut bus).sdo_read_into(object, Sum::default())?;
+    let before = mailbox_device(&mut bus).sdo_read::<Vec<u8>>(0x2002, 0)?;
+    mailbox_device(&mut bus).sdo_write_from(object, Sevens(before.len() as u64))?;
+    let sum = mailbox_device(&mut bus).sdo_read_into(object, Sum::default())?;
     assert_eq!((sum.bytes, sum.sum), (before.len() as u64, 7 * before.len() as u64));
     assert!(sum.pieces > 1, "{sum:?}");
 
     let options = FoeOptions::default();
-    assert_eq!(speaker(&mut bus).foe_write_from("large", Sevens(50_000), options, |_| ())?, 50_000);
-    let sum = speaker(&mut bus).foe_read_into("large", Sum::default(), options, |_| ())?;
+    assert_eq!(mailbox_device(&mut bus).foe_write_from("large", Sevens(50_000), options, |_| ())?, 50_000);
+    let sum = mailbox_device(&mut bus).foe_read_into("large", Sum::default(), options, |_| ())?;
     assert_eq!((sum.bytes, sum.sum), (50_000, 350_000));
     assert!(sum.pieces > 10, "{sum:?}");
     Ok(())
@@ -152,17 +152,17 @@ fn ads_states_and_elements_of_idns_are_written_too() -> Result<(), Box<dyn StdEr
     let address = |port| AmsAddress { net_id: NetId([5, 18, 2, 3, 2, 1]), port };
     let route = AoeRoute::new(address(1000), address(0x8000));
     let written = vec![4, 3, 2, 1];
-    assert_eq!(speaker(&mut bus).aoe_read_write(route, MEMORY, 16, written.clone(), 4)?, written);
+    assert_eq!(mailbox_device(&mut bus).aoe_read_write(route, MEMORY, 16, written.clone(), 4)?, written);
     // Run in PREOP, then stop.
-    assert_eq!(speaker(&mut bus).aoe_states(route)?, AoeStates::new(5, 2));
-    speaker(&mut bus).aoe_set_states(route, AoeStates::new(6, 0), Vec::new())?;
-    assert_eq!(speaker(&mut bus).aoe_states(route)?.ads, 6);
+    assert_eq!(mailbox_device(&mut bus).aoe_states(route)?, AoeStates::new(5, 2));
+    mailbox_device(&mut bus).aoe_set_states(route, AoeStates::new(6, 0), Vec::new())?;
+    assert_eq!(mailbox_device(&mut bus).aoe_states(route)?.ads, 6);
 
     let position = SoeAddress::value(0, Idn::standard(0, 47));
-    speaker(&mut bus).soe_write_elements(position, 9i32.to_le_bytes().to_vec())?;
-    assert_eq!(speaker(&mut bus).soe_read::<i32>(0, Idn::standard(0, 47))?, 9);
+    mailbox_device(&mut bus).soe_write_elements(position, 9i32.to_le_bytes().to_vec())?;
+    assert_eq!(mailbox_device(&mut bus).soe_read::<i32>(0, Idn::standard(0, 47))?, 9);
     let name = SoeAddress { elements: SoeElements::NAME, ..position };
-    let refused = speaker(&mut bus).soe_write_elements(name, b"other".to_vec());
+    let refused = mailbox_device(&mut bus).soe_write_elements(name, b"other".to_vec());
     assert!(matches!(failure(refused), SubDeviceFailure::Soe(_)));
     Ok(())
 }
@@ -195,23 +195,23 @@ const UPLOAD: [u8; 10] = [0x00, 0x20, 0x40, 0x00, 0x10, 0, 0, 0, 0, 0];
 #[test]
 fn composed_messages_get_the_next_mail_or_none() -> Result<(), Box<dyn StdError>> {
     let mut bus = scanned()?;
-    let answer = speaker(&mut bus).mail_exchange(Lane::Coe, UPLOAD.to_vec())?;
+    let answer = mailbox_device(&mut bus).mail_exchange(Lane::Coe, UPLOAD.to_vec())?;
     assert_eq!(answer[..6], [0x00, 0x30, 0x43, 0x00, 0x10, 0x00]);
-    let status = speaker(&mut bus).mailbox_status().expect("it has one");
+    let status = mailbox_device(&mut bus).mailbox_status().expect("it has one");
     assert!(status.is_open && status.is_idle && status.counters.written >= 1, "{status:?}");
     assert!(bus.subdevice(Position(0)).mailbox_status().is_none_or(|status| !status.is_open));
 
     let message = Voe { vendor_id: 0x0C47, vendor_type: 1, data: vec![0xAA, 0xBB] };
     let payload = [0x47, 0x0C, 0, 0, 1, 0, 0xAA, 0xBB];
-    speaker(&mut bus).mail_send(Lane::Voe, payload.to_vec())?;
-    assert_eq!(speaker(&mut bus).voe_receive_directly()?, message);
-    speaker(&mut bus).mail_send(Lane::Voe, payload.to_vec())?;
-    assert_eq!(speaker(&mut bus).voe_receive()?, message);
-    assert_eq!(speaker(&mut bus).unsolicited_overruns(Unsolicited::Voe), Some(0));
+    mailbox_device(&mut bus).mail_send(Lane::Voe, payload.to_vec())?;
+    assert_eq!(mailbox_device(&mut bus).voe_receive_directly()?, message);
+    mailbox_device(&mut bus).mail_send(Lane::Voe, payload.to_vec())?;
+    assert_eq!(mailbox_device(&mut bus).voe_receive()?, message);
+    assert_eq!(mailbox_device(&mut bus).unsolicited_overruns(Unsolicited::Voe), Some(0));
 
-    let refused = speaker(&mut bus).mail_exchange(Lane::Coe, vec![0x00, 0x90]);
+    let refused = mailbox_device(&mut bus).mail_exchange(Lane::Coe, vec![0x00, 0x90]);
     assert!(matches!(failure(refused), SubDeviceFailure::Mailbox(_)));
-    let status = speaker(&mut bus).mailbox_status().expect("it has one");
+    let status = mailbox_device(&mut bus).mailbox_status().expect("it has one");
     assert_ne!(status.last_protocol_error, 0, "{status:?}");
     Ok(())
 }

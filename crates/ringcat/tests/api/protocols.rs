@@ -26,7 +26,7 @@ fn scanned() -> Result<Bus, Error> {
     Ok(main_device)
 }
 
-fn speaker(bus: &mut Bus) -> SubDevice<&mut Bus> {
+fn mailbox_device(bus: &mut Bus) -> SubDevice<&mut Bus> {
     bus.subdevice(SPEAKER)
 }
 
@@ -35,17 +35,17 @@ fn speaker(bus: &mut Bus) -> SubDevice<&mut Bus> {
 fn elements_of_an_idn_are_read_and_a_procedure_command_runs_until_it_is_ended() -> Result<(), Box<dyn StdError>> {
     let mut bus = scanned()?;
     let (drive, position) = (0, Idn::standard(0, 47));
-    speaker(&mut bus).soe_write(drive, position, 5i32)?;
-    let value = speaker(&mut bus).soe_read_elements(SoeAddress::value(drive, position))?;
+    mailbox_device(&mut bus).soe_write(drive, position, 5i32)?;
+    let value = mailbox_device(&mut bus).soe_read_elements(SoeAddress::value(drive, position))?;
     assert_eq!(value, 5i32.to_le_bytes());
     let name = SoeAddress { elements: SoeElements::NAME, ..SoeAddress::value(drive, position) };
-    assert!(!speaker(&mut bus).soe_read_elements(name)?.is_empty());
+    assert!(!mailbox_device(&mut bus).soe_read_elements(name)?.is_empty());
     let command = Idn::standard(0, 99);
-    assert!(!speaker(&mut bus).soe_command_state(drive, command)?.is_set());
-    speaker(&mut bus).soe_command(drive, command)?;
-    assert!(speaker(&mut bus).soe_command_state(drive, command)?.is_running());
-    speaker(&mut bus).soe_abort_command(drive, command)?;
-    assert!(!speaker(&mut bus).soe_command_state(drive, command)?.is_set());
+    assert!(!mailbox_device(&mut bus).soe_command_state(drive, command)?.is_set());
+    mailbox_device(&mut bus).soe_command(drive, command)?;
+    assert!(mailbox_device(&mut bus).soe_command_state(drive, command)?.is_running());
+    mailbox_device(&mut bus).soe_abort_command(drive, command)?;
+    assert!(!mailbox_device(&mut bus).soe_command_state(drive, command)?.is_set());
     Ok(())
 }
 
@@ -55,10 +55,10 @@ fn an_ads_device_says_what_it_is_and_its_memory_is_written_and_read() -> Result<
     let mut bus = scanned()?;
     let address = |port| AmsAddress { net_id: NetId([5, 18, 2, 3, 2, 1]), port };
     let route = AoeRoute::new(address(1000), address(0x8000));
-    assert!(!speaker(&mut bus).aoe_device_info(route)?.name.is_empty());
-    speaker(&mut bus).aoe_write(route, MEMORY, 16, vec![1, 2, 3, 4])?;
-    assert_eq!(speaker(&mut bus).aoe_read(route, MEMORY, 16, 4)?, [1, 2, 3, 4]);
-    let nowhere = speaker(&mut bus).aoe_read(route, MEMORY + 1, 16, 4).expect_err("no such group");
+    assert!(!mailbox_device(&mut bus).aoe_device_info(route)?.name.is_empty());
+    mailbox_device(&mut bus).aoe_write(route, MEMORY, 16, vec![1, 2, 3, 4])?;
+    assert_eq!(mailbox_device(&mut bus).aoe_read(route, MEMORY, 16, 4)?, [1, 2, 3, 4]);
+    let nowhere = mailbox_device(&mut bus).aoe_read(route, MEMORY + 1, 16, 4).expect_err("no such group");
     let Error::SubDevice(nowhere) = nowhere else { panic!("{nowhere:?}") };
     assert!(matches!(nowhere.failure, SubDeviceFailure::Aoe(_)), "{nowhere:?}");
     Ok(())
@@ -69,8 +69,8 @@ fn an_ads_device_says_what_it_is_and_its_memory_is_written_and_read() -> Result<
 fn messages_of_a_vendor_are_sent_and_exchanged() -> Result<(), Box<dyn StdError>> {
     let mut bus = scanned()?;
     let message = |vendor_type| Voe { vendor_id: 0x0C47, vendor_type, data: vec![9; 40] };
-    assert_eq!(speaker(&mut bus).voe_exchange(message(3))?, message(3));
-    speaker(&mut bus).voe_send(message(4))?;
+    assert_eq!(mailbox_device(&mut bus).voe_exchange(message(3))?, message(3));
+    mailbox_device(&mut bus).voe_send(message(4))?;
     Ok(())
 }
 
@@ -79,15 +79,15 @@ fn messages_of_a_vendor_are_sent_and_exchanged() -> Result<(), Box<dyn StdError>
 fn messages_of_the_diagnosis_history_are_read_and_acknowledged() -> Result<(), Box<dyn StdError>> {
     let mut bus = scanned()?;
     let message = DiagnosisMessage::decode(&[0, 0xE8, 0x34, 0x12, 2, 0, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0])?;
-    assert!(speaker(&mut bus).diagnosis()?.messages.is_empty());
+    assert!(mailbox_device(&mut bus).diagnosis()?.messages.is_empty());
     let device = bus.links_mut().network_mut().device_mut(DeviceIndex(1));
     assert!(device.application.diagnose(&message, &[]));
-    let history = speaker(&mut bus).diagnosis()?;
+    let history = mailbox_device(&mut bus).diagnosis()?;
     assert_eq!((history.messages.len(), history.new_available), (1, true));
-    speaker(&mut bus).acknowledge_diagnosis(history.newest)?;
-    assert!(!speaker(&mut bus).diagnosis()?.new_available);
-    speaker(&mut bus).acknowledge_diagnosis(0)?;
-    assert!(speaker(&mut bus).diagnosis()?.messages.is_empty());
+    mailbox_device(&mut bus).acknowledge_diagnosis(history.newest)?;
+    assert!(!mailbox_device(&mut bus).diagnosis()?.new_available);
+    mailbox_device(&mut bus).acknowledge_diagnosis(0)?;
+    assert!(mailbox_device(&mut bus).diagnosis()?.messages.is_empty());
     Ok(())
 }
 

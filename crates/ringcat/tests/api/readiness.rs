@@ -21,7 +21,7 @@ const PERIOD: Duration = Duration::from_millis(2);
 const LIMIT: Duration = Duration::from_secs(30);
 const SHORT: Duration = Duration::from_secs(2);
 
-/// The drive is told to set an object that it does not have.
+/// The drive is reported to set an object that it does not have.
 fn declaration() -> Declaration {
     let mut declaration = Declaration::new(PERIOD);
     declaration.add(SubDeviceConfig::at_position(0));

@@ -40,8 +40,8 @@ fn objects_and_files_are_moved_from_any_thread_and_requests_from_the_cyclic_one(
     let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
     let scan = supervisor.scan()?;
     // Before activation, in PREOP.
-    let speaker = supervisor.subdevice(Position(1)).limits(TRANSFER.with_bytes(200_000));
-    assert_eq!(speaker.sdo_read::<Vec<u8>>(0x2002, 0)?.len(), 100_000);
+    let mailbox_device = supervisor.subdevice(Position(1)).limits(TRANSFER.with_bytes(200_000));
+    assert_eq!(mailbox_device.sdo_read::<Vec<u8>>(0x2002, 0)?.len(), 100_000);
     let mut request = supervisor.create_sdo_request(SPEAKER, 4)?;
     let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
     let read = Arc::new(AtomicU32::new(0));
@@ -68,14 +68,14 @@ fn objects_and_files_are_moved_from_any_thread_and_requests_from_the_cyclic_one(
     cycles.supervisor().wait_until_op(LIMIT)?;
     // During process data, by a handle of its own.
     let handle = cycles.supervisor().clone();
-    let speaker = handle.subdevice(SPEAKER).limits(TRANSFER);
-    speaker.sdo_write(0x2001, 7, 0x1234u16)?;
+    let mailbox_device = handle.subdevice(SPEAKER).limits(TRANSFER);
+    mailbox_device.sdo_write(0x2001, 7, 0x1234u16)?;
     let end = Instant::now() + LIMIT;
     while read.load(Ordering::Relaxed) != 0x1234 {
         assert!(Instant::now() < end, "the cyclic thread reads what another one wrote");
         sleep(Duration::from_millis(1));
     }
-    let error = speaker.sdo_read::<u32>(0x7777, 0).expect_err("there is no such object");
+    let error = mailbox_device.sdo_read::<u32>(0x7777, 0).expect_err("there is no such object");
     assert!(error.to_string().contains("0x06020000"), "{error}");
     assert_eq!(file_there_and_back(&handle)?, vec![7; 3000]);
     let supervisor = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?.supervisor;
@@ -108,12 +108,12 @@ fn services_on_single_subdevices_and_jobs_work_from_any_thread() -> Result<(), E
     let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
     let scan = supervisor.scan()?;
     // Before activation.
-    let speaker = supervisor.subdevice(Position(1));
-    speaker.register_write(USER_RAM, vec![1, 2, 3])?;
-    assert_eq!(speaker.register_read_bytes(USER_RAM, 3)?, [1, 2, 3]);
-    let image = speaker.sii_read()?;
-    assert!(speaker.sii_write(image[..64].to_vec(), false).is_err(), "no image");
-    assert_eq!(speaker.sii_write(image, false)?.written, 0);
+    let mailbox_device = supervisor.subdevice(Position(1));
+    mailbox_device.register_write(USER_RAM, vec![1, 2, 3])?;
+    assert_eq!(mailbox_device.register_read_bytes(USER_RAM, 3)?, [1, 2, 3]);
+    let image = mailbox_device.sii_read()?;
+    assert!(mailbox_device.sii_write(image[..64].to_vec(), false).is_err(), "no image");
+    assert_eq!(mailbox_device.sii_write(image, false)?.written, 0);
     assert_eq!(supervisor.statistics(SPEAKER)?, None);
     assert!(!supervisor.force_topology_change()?);
     assert!(supervisor.rescan(LIMIT).is_err(), "nothing is declared");

@@ -133,10 +133,10 @@ fn an_overall_limit_ends_what_takes_too_long() -> Result<(), Box<dyn StdError>> 
 fn work_that_does_not_end_in_time_beside_cycles_is_given_up() -> Result<(), Box<dyn StdError>> {
     let mut main_device = main_device()?;
     main_device.scan()?;
-    let (declaration, [_, speaker, drive]) = declaration();
+    let (declaration, [_, mailbox_device, drive]) = declaration();
     let mut application = main_device.activate(declaration)?;
     application.wait_until_op(LIMIT)?;
-    let large = application.subdevice(speaker).sdo_read::<Vec<u8>>(0x2002, 0);
+    let large = application.subdevice(mailbox_device).sdo_read::<Vec<u8>>(0x2002, 0);
     let late = application.cycle_until(large, 5 * PERIOD, |_| ());
     assert!(matches!(late, Err(Error::TimedOut { .. })), "{late:?}");
     let position = application.subdevice(drive).sdo_read::<i32>(0x6064, 0);
@@ -160,13 +160,13 @@ fn any_thread_uses_a_subdevice_while_cycles_run() -> Result<(), Box<dyn StdError
     assert_eq!(failure(supervisor.subdevice(SPEAKER).sdo_read::<u16>(0x2001, 7)), SubDeviceFailure::NotScanned);
     supervisor.scan()?;
     assert_eq!(failure(supervisor.subdevice(SubDeviceId(1)).sdo_info()), SubDeviceFailure::NotActive);
-    let (declaration, [_, speaker, drive]) = declaration();
+    let (declaration, [_, mailbox_device, drive]) = declaration();
     let cycles = supervisor.activate(declaration, cyclic)?.start_cycles(|| (), |_| ControlFlow::Continue(()))?;
     cycles.supervisor().wait_until_op(LIMIT)?;
     assert_eq!(failure(cycles.supervisor().subdevice(SPEAKER).sdo_info()), SubDeviceFailure::Active);
     let patient = TransferLimits::default().with_request(LIMIT).with_answer(LIMIT);
     thread::scope(|scope| {
-        let threads = [speaker, drive].map(|subdevice| {
+        let threads = [mailbox_device, drive].map(|subdevice| {
             let supervisor = cycles.supervisor().clone();
             scope.spawn(move || {
                 let subdevice = supervisor.subdevice(subdevice).limits(patient);

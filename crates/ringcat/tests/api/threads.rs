@@ -349,7 +349,7 @@ fn two_threads_deactivate_and_activate_another_declaration() -> Result<(), Error
     let all_in_preop = || plant.with_network(|network| network.devices().all(|device| device.al_status() == preop));
     until("idle operation brings all to PREOP", all_in_preop);
     for round in 0..3 {
-        let found = supervisor.with(|engine| engine.subdevices())?;
+        let found = supervisor.subdevices()?;
         let declaration = automatic(&found[..=round], PERIOD);
         let application = supervisor.activate(declaration, cyclic)?;
         let cycles = application.start_cycles(|| (), |_| ControlFlow::Continue(()))?;

@@ -27,7 +27,7 @@ const UNIT: &str = "ethercat.service";
 const START: Duration = Duration::from_secs(60);
 /// It has ended within this time after a signal.
 const STOP: Duration = Duration::from_secs(10);
-/// Interval of looks at whether it has ended early.
+/// Interval of checks whether it has ended early.
 const LOOK: Duration = Duration::from_millis(100);
 /// Exit code of the LSB for a service that does not run.
 const NOT_RUNNING: u8 = 3;

@@ -1,6 +1,6 @@
-//! Which configuration file counts: the rule of the IgH manual (7.4.4).
+//! Which configuration file is used: the rule of the IgH manual (7.4.4).
 //!
-//! Under systemd `/etc/ethercat.conf` counts and `/etc/sysconfig/ethercat` is ignored; without it, it is the other way
+//! Under systemd `/etc/ethercat.conf` is used and `/etc/sysconfig/ethercat` is ignored; without it, it is the other way
 //! round.
 
 use std::fmt;
@@ -13,7 +13,7 @@ pub const WITHOUT_SYSTEMD: &str = "etc/sysconfig/ethercat";
 /// There under systemd (`sd_booted(3)`).
 const SYSTEMD: &str = "run/systemd/system";
 
-/// The file that counts.
+/// The file that is used.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
     /// The file.
@@ -24,7 +24,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// The file that counts on this machine.
+    /// The file that is used on this machine.
     pub fn find() -> Place {
         Place::below(Path::new("/"))
     }

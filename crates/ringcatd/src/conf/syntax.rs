@@ -2,7 +2,7 @@
 //!
 //! In: the bytes of a file. Out: its assignments with their lines, and its mistakes. `NAME=value`, both kinds of
 //! quotes, `\` and comments mean what they mean in `sh`, so a script can read the same file. Nothing is expanded: what
-//! `sh` would expand, or run, is a mistake with its name. Each byte is looked at a few times at most.
+//! `sh` would expand, or run, is a mistake with its name. Each byte is read a few times at most.
 
 use super::model::Mistake;
 

@@ -1,8 +1,8 @@
 //! What the variables of a configuration file mean.
 //!
-//! In: assignments. Out: a [`Conf`], and mistakes. Each variable of the IgH manual (7.4.2) is honoured or explained; of
-//! several assignments of one variable the last counts, as in `sh`. A name that is none, but looks like one, is a
-//! mistake: a setting that is misspelt must not be silently without effect.
+//! In: assignments. Out: a [`Conf`], and mistakes. Each variable of the IgH manual (7.4.2) has an effect, or a
+//! sentence that explains why it has none; of several assignments of one variable the last one is used, as in `sh`. An
+//! unknown name with a known begin is a mistake: a misspelt setting must not be silently without effect.
 
 mod own;
 
@@ -103,7 +103,7 @@ pub fn understand(assignments: Vec<Assignment>, mistakes: &mut Vec<Mistake>) -> 
 }
 
 impl Reading {
-    /// Takes a variable: what it means.
+    /// Evaluates a variable. Returns its meaning.
     fn take(&mut self, line: usize, name: &str, value: &str) -> Result<String, String> {
         match Variable::of(name)? {
             Some(Variable::Device(_)) if value.is_empty() => Ok("empty: no master".to_owned()),
@@ -153,7 +153,7 @@ impl Reading {
         Ok(text)
     }
 
-    /// Puts the masters together. What is absent is a mistake only if no other one is the reason.
+    /// Puts the masters together. An absent part is a mistake only if no other mistake explains it.
     fn masters(&mut self, mistakes: &mut Vec<Mistake>) {
         let is_whole = mistakes.is_empty();
         let mut wrong = |line: usize, text: String| mistakes.push(Mistake { line: Some(line), text });

@@ -30,7 +30,7 @@ fn a_bus_of_100_subdevices_is_taken_over_within_20_ms_without_a_scan() {
         let resumed = Event::Resumed { subdevices: 100, in_state: 100, differs: false };
         assert!(events.contains(&resumed), "{events:?}");
         assert!(!events.iter().any(|event| matches!(event, Event::ScanProgress { .. })), "{events:?}");
-        assert_eq!(bus.supervisor().with(|engine| engine.subdevices().len()).expect("it runs"), 100);
+        assert_eq!(bus.supervisor().subdevices().map(|found| found.len()).expect("it runs"), 100);
         bus.release().expect("the daemon takes it");
         assert!(bench.are_in(AlState::PreOp), "no SubDevice has left PREOP");
         bench.wait_until("scanned", |bench| bench.client().ask(0, ringcat::daemon::Query::State, Vec::new()).is_ok());
@@ -70,7 +70,7 @@ fn nothing_is_left_of_a_thousand_hand_overs() {
     let (before, threads_before) = (descriptors(), threads());
     for round in 0..1000 {
         let bus = bench.take();
-        assert_eq!(bus.supervisor().with(|engine| engine.subdevices().len()).expect("it runs"), 3, "round {round}");
+        assert_eq!(bus.supervisor().subdevices().map(|found| found.len()).expect("it runs"), 3, "round {round}");
         bus.release().expect("the daemon takes it");
     }
     let after = resident_kib();

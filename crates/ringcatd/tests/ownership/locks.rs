@@ -40,12 +40,12 @@ fn another_user_can_lock_none_of_the_files_that_a_daemon_waits_for() {
 #[test]
 fn a_daemon_writes_and_makes_nothing_behind_a_link_with_the_name_of_its_lock() {
     let (directory, _turn) = (directory(), turn());
-    let (socket, victim) = (directory.join("socket"), directory.join("victim"));
+    let (socket, target_file) = (directory.join("socket"), directory.join("target_file"));
     let (file, text) = (directory.join("segment.toml"), "[segment]\n[[device]]\ntype = \"servo\"\n");
     std::fs::write(&file, text).expect("it can be written");
-    std::fs::write(&victim, "precious").expect("it can be written");
+    std::fs::write(&target_file, "precious").expect("it can be written");
     for lock in LOCKS {
-        for target in [victim.clone(), directory.join("nothing")] {
+        for target in [target_file.clone(), directory.join("nothing")] {
             let link = socket.with_extension(lock);
             symlink(&target, &link).expect("it can be made");
             let master = format!("0=sim:{}", file.display());
@@ -54,7 +54,7 @@ fn a_daemon_writes_and_makes_nothing_behind_a_link_with_the_name_of_its_lock() {
             std::fs::remove_file(&link).expect("it is there");
         }
     }
-    assert_eq!(std::fs::read(&victim).expect("it is there"), b"precious");
+    assert_eq!(std::fs::read(&target_file).expect("it is there"), b"precious");
     assert!(!directory.join("nothing").exists() && !socket.exists());
     std::fs::remove_dir_all(directory).expect("it is there");
 }

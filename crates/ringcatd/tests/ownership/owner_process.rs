@@ -208,7 +208,7 @@ fn run(socket: &Path, work: Work) {
 
 /// Brings all to OP, and cycles until the input ends.
 fn cycle(bus: &mut OwnedBus, work: Work, ended: &std::sync::mpsc::Receiver<()>) {
-    let found = bus.supervisor().with(|engine| engine.subdevices()).expect("it runs");
+    let found = bus.supervisor().subdevices().expect("it runs");
     let links = bus.take_links().expect("they are unused");
     let mut declaration = Declaration::new(Duration::from_millis(1));
     let declared = found.iter().enumerate().map(|(at, info)| match SubDeviceConfig::from_info(info) {

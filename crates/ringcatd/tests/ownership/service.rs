@@ -1,4 +1,4 @@
-//! The program as a service: its configuration file, and what the service manager is told.
+//! The program as a service: its configuration file, and what the service manager is reported.
 
 use std::ffi::OsString;
 use std::os::unix::net::UnixDatagram;

@@ -200,7 +200,7 @@ fn other_users_of_an_interface_that_is_named_are_told_at_the_start() {
     bench.start_daemon(&["--master", "0=near0"]);
     bench.wait_for(AlState::PreOp);
     bench.wait_for_line("ringcatd: master 0: near0 has the IP address 192.0.2.1, so other programs send");
-    // A second daemon is told of the first one's sockets.
+    // A second daemon is reported of the first one's sockets.
     let socket = bench.place.join("second");
     bench.start_daemon_at(&socket, &["--master", "0=near0"]);
     bench.wait_for_line("receives EtherCAT frames on near0 already");

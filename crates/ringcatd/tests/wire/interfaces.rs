@@ -232,8 +232,8 @@ fn a_segment_is_listened_to_from_when_its_cable_is_plugged_in() {
     }
     let text = fault(&bench, &socket);
     assert!(text.as_ref().is_some_and(|text| text.starts_with(OTHER)), "{text:?}");
-    let told = bench.lines().iter().filter(|line| line.contains(OTHER)).count();
-    assert_eq!(told, 1, "it is told once: {:#?}", bench.lines());
+    let reports = bench.lines().iter().filter(|line| line.contains(OTHER)).count();
+    assert_eq!(reports, 1, "it is reported once: {:#?}", bench.lines());
     owner.kill().expect("it runs");
     owner.wait().expect("it has ended");
     bench.kill_daemon(first);

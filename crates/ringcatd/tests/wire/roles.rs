@@ -199,7 +199,7 @@ fn application(place: &Path, role: &str) {
     let since = bus.supervisor().events_since(0).expect("it runs");
     let is_resumed = |event: &Event| matches!(event, Event::Resumed { subdevices: 3, in_state: 3, differs: false });
     assert!(since.events.iter().any(|timed| is_resumed(&timed.event)), "{since:?}");
-    let found = bus.supervisor().with(|engine| engine.subdevices()).expect("it runs");
+    let found = bus.supervisor().subdevices().expect("it runs");
     let links = bus.take_links().expect("they are unused");
     let declaration = automatic(&found, Duration::from_millis(4));
     let mut application = bus.supervisor().clone().activate(declaration, links).expect("it fits the scan");

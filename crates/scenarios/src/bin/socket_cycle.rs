@@ -307,21 +307,21 @@ impl Run {
         let mut command = namespaces.near(beside("cycle_process")?);
         command.args(["two", mode, &PERIOD_US.to_string(), &CPU_CYCLES.to_string(), "never"]);
         let output = command.stdin(Stdio::null()).output().map_err(said)?;
-        let told = String::from_utf8_lossy(&output.stdout).into_owned();
+        let reports = String::from_utf8_lossy(&output.stdout).into_owned();
         if !output.status.success() {
             return Err(format!("{mode}: {}", String::from_utf8_lossy(&output.stderr).trim()));
         }
         let value = |name: &str| {
-            let line = told.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(": "));
+            let line = reports.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(": "));
             let word = line.and_then(|rest| rest.split_whitespace().next());
-            word.and_then(|word| word.parse::<f64>().ok()).ok_or_else(|| format!("no \"{name}\" in {told:?}"))
+            word.and_then(|word| word.parse::<f64>().ok()).ok_or_else(|| format!("no \"{name}\" in {reports:?}"))
         };
         Ok(Run {
             disturbed: value("disturbed")?,
             cpu_percent: value("cpu percent")?,
             resident_mb: value("resident")? / 1024.0,
             own_mb: OWN.iter().map(|part| value(&format!("of it {part}"))).sum::<Tried<f64>>()? / 1024.0,
-            memory: told.lines().filter(|line| line.starts_with("of it")).map(str::to_owned).collect(),
+            memory: reports.lines().filter(|line| line.starts_with("of it")).map(str::to_owned).collect(),
         })
     }
 }

@@ -5,7 +5,7 @@ use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::network::Network;
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 
-use crate::check::Judged;
+use crate::check::Evaluated;
 
 /// Change of a device's AL status, seen at the beginning of a cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +34,7 @@ impl Step {
 pub(super) struct Journal {
     pub(super) lines: Vec<(Instant, String)>,
     pub(super) events: Vec<TimedEvent>,
-    pub(super) judged: Vec<Judged>,
+    pub(super) evaluated: Vec<Evaluated>,
     pub(super) steps: Vec<Step>,
     pub(super) status: Vec<AlStatus>,
 }
@@ -47,14 +47,16 @@ impl Journal {
     }
 
     /// Records an evaluation; the log has only those that differ from the one before.
-    pub(super) fn judge(&mut self, judged: Judged) {
-        let before = self.judged.iter().rev().find(|before| before.domain == judged.domain);
-        if before.is_none_or(|before| before.delivery != judged.delivery || before.status.wkc != judged.status.wkc) {
-            let Judged { domain, at, status, delivery, .. } = &judged;
+    pub(super) fn evaluate(&mut self, evaluated: Evaluated) {
+        let before = self.evaluated.iter().rev().find(|before| before.domain == evaluated.domain);
+        if before
+            .is_none_or(|before| before.delivery != evaluated.delivery || before.status.wkc != evaluated.status.wkc)
+        {
+            let Evaluated { domain, at, status, delivery, .. } = &evaluated;
             let line = format!("  domain {}: {delivery:?}, {} of {}", domain.0, status.wkc, status.expected);
             self.lines.push((*at, line));
         }
-        self.judged.push(judged);
+        self.evaluated.push(evaluated);
     }
 
     /// Records the states of the devices.

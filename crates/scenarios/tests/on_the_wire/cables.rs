@@ -31,7 +31,7 @@ struct Edge {
     /// Cycles that RingCAT skipped because this machine stalled.
     left_out: usize,
     /// Messages about the ring and the links.
-    told: Vec<String>,
+    reports: Vec<String>,
 }
 
 impl Edge {
@@ -112,10 +112,17 @@ fn edge(bench: &Bench, run: &Said, what: &str, noticed: Option<&str>, act: impl 
         SimulatorLateness { count: now.count - late.count, together_ms: now.together_ms - late.together_ms };
     assert_eq!(states(bench, "OP"), 16, "{what}: {}", bench.order("status"));
     let incomplete = incomplete_cycles(&lines).unwrap_or_else(|| panic!("{what}: {lines:#?}"));
-    let told = lines.iter().filter_map(|line| line.split_once(" ms  ")).map(|(_, words)| words.to_owned());
-    let told =
-        told.filter(|words| ["ring", "Line", "redundancy", "MAIN", "REDUNDANT"].iter().any(|it| words.starts_with(it)));
-    Edge { what: what.to_owned(), incomplete, noticed_ms, simulator, left_out: left_out(&lines), told: told.collect() }
+    let reports = lines.iter().filter_map(|line| line.split_once(" ms  ")).map(|(_, words)| words.to_owned());
+    let reports = reports
+        .filter(|words| ["ring", "Line", "redundancy", "MAIN", "REDUNDANT"].iter().any(|it| words.starts_with(it)));
+    Edge {
+        what: what.to_owned(),
+        incomplete,
+        noticed_ms,
+        simulator,
+        left_out: left_out(&lines),
+        reports: reports.collect(),
+    }
 }
 
 /// Checks the exact messages of a cut or repair of an inner cable.
@@ -130,9 +137,15 @@ fn check_words(edge: &Edge, device: usize, is_cut: bool) {
         &["redundancy restored: the ring tolerates one break".into()]
     };
     for words in expected {
-        assert_eq!(edge.told.iter().filter(|told| *told == words).count(), 1, "{}: {:?}", edge.what, edge.told);
+        assert_eq!(
+            edge.reports.iter().filter(|reports| *reports == words).count(),
+            1,
+            "{}: {:?}",
+            edge.what,
+            edge.reports
+        );
     }
-    let places: Vec<&String> = edge.told.iter().filter(|told| told.starts_with("Line")).collect();
+    let places: Vec<&String> = edge.reports.iter().filter(|reports| reports.starts_with("Line")).collect();
     let [place] = places[..] else { panic!("{}: {places:?}", edge.what) };
     let ends = [format!("between SubDevice {device} "), format!("port 1 and SubDevice {} ", device + 1)];
     let station = StationAddress(0x1001 + device as u16 + 1);

@@ -157,8 +157,8 @@ fn captures_of_a_ring_of_16_with_a_cut_have_no_findings() {
     }
     let (output, errors) = said(&finish(run));
     assert!(output.contains("ring open") && output.contains("stopped: outputs zero"), "{output}{errors}");
-    let (told, errors) = said(&interrupt(onlooker));
-    assert!(told.contains("main1: ") && told.contains(" 0 not recorded"), "{told}{errors}");
+    let (reports, errors) = said(&interrupt(onlooker));
+    assert!(reports.contains("main1: ") && reports.contains(" 0 not recorded"), "{reports}{errors}");
     let verdict = own.check("run on a ring of 16, a cable cut and healed, a SubDevice off and on");
     assert_eq!(verdict.pairs, verdict.sent[0]);
     assert!(verdict.missing < 100, "{verdict}");
@@ -232,8 +232,8 @@ fn ringcat_capture_records_ethercat_or_all_frames_and_names_errors() {
     assert!(said_so.status.success(), "{:?}", said(&said_so));
     bench.ringcat(&["scan", "--main", "main0"]);
     for onlooker in onlookers {
-        let (told, errors) = said(&finish(onlooker));
-        assert!(told.contains("main0: ") && told.contains(" 0 not recorded"), "{told}{errors}");
+        let (reports, errors) = said(&finish(onlooker));
+        assert!(reports.contains("main0: ") && reports.contains(" 0 not recorded"), "{reports}{errors}");
     }
     let count = |file: &CaptureFile| {
         let capture = Capture::parse(&file.bytes()).expect("a capture");

@@ -136,7 +136,7 @@ fn file(name: &str) -> PathBuf {
 }
 
 /// Checks that the delays of SubDevices with a clock are near the true ones.
-fn judge(name: &str, delays: &[i64], truth: &[Option<i64>]) {
+fn evaluate(name: &str, delays: &[i64], truth: &[Option<i64>]) {
     let pairs: Vec<(i64, i64)> =
         delays.iter().zip(truth).filter_map(|(delay, truth)| Some((*delay, (*truth)?))).collect();
     println!("{name}: {:?} ns", pairs.iter().map(|(delay, _)| delay).collect::<Vec<_>>());
@@ -170,11 +170,11 @@ fn delays_of_ethercrab_and_ringcat_are_equal_and_right() {
         let (json, errors) = said(&bench.ringcat(&arguments));
         let result: Value = serde_json::from_str(json.lines().last().unwrap_or_default()).expect("a line of JSON");
         assert_eq!(result["locked"], true, "{json}{errors}");
-        let mut told = result["clocks"].as_array().expect("clocks").iter().map(|clock| &clock["delay_ns"]);
-        let mut told = || told.next().expect("a clock").as_i64().expect("a number");
-        let told: Vec<i64> = truth.iter().map(|has_clock| has_clock.map_or(0, |_| told())).collect();
-        judge("ringcat reports", &told, &truth);
-        judge("ringcat wrote", &written(&bench, count), &truth);
+        let mut reports = result["clocks"].as_array().expect("clocks").iter().map(|clock| &clock["delay_ns"]);
+        let mut reports = || reports.next().expect("a clock").as_i64().expect("a number");
+        let reports: Vec<i64> = truth.iter().map(|has_clock| has_clock.map_or(0, |_| reports())).collect();
+        evaluate("ringcat reports", &reports, &truth);
+        evaluate("ringcat wrote", &written(&bench, count), &truth);
         check_capture(&capture, truth.iter().flatten().count());
         bench.show_simulator_lateness();
     }
@@ -189,8 +189,8 @@ fn foreign_delays(bench: &Bench, client: &Path, truth: &[Option<i64>]) {
     if reported.len() != count {
         panic!("{}", client.end().1);
     }
-    judge("ethercrab reports", &reported, truth);
-    judge("ethercrab wrote", &written(bench, count), truth);
+    evaluate("ethercrab reports", &reported, truth);
+    evaluate("ethercrab wrote", &written(bench, count), truth);
 }
 
 /// The capture gives the same delays and offsets.

@@ -125,9 +125,9 @@ fn client(bench: &Bench, tasks: &[&str]) {
 
 fn ask(tasks: &[&str], start: impl FnOnce(&[&str]) -> Child) {
     let output = finish(start(&[&["-c", CLIENT], tasks].concat()));
-    let (told, errors) = said(&output);
-    assert!(output.status.success(), "{told}{errors}");
-    print!("{told}");
+    let (reports, errors) = said(&output);
+    assert!(output.status.success(), "{reports}{errors}");
+    print!("{reports}");
 }
 
 // covers: eoe-interfaces
@@ -204,9 +204,12 @@ fn without_permission_eoe_prints_a_warning_and_cycles_continue() {
     let output = finish(
         bench.start(Path::new("setpriv"), &[&arguments[..], &["--for", "500ms", "--receive", "block"]].concat()),
     );
-    let (told, errors) = said(&output);
-    assert!(told.contains("all SubDevices are in OP") && told.contains("stopped: outputs zero"), "{told}{errors}");
+    let (reports, errors) = said(&output);
+    assert!(
+        reports.contains("all SubDevices are in OP") && reports.contains("stopped: outputs zero"),
+        "{reports}{errors}"
+    );
     assert_eq!(errors.matches("EoE: not permitted to make the network interface eoe0").count(), 2, "{errors}");
     assert!(errors.contains("sudo setcap cap_net_raw,cap_net_admin"), "{errors}");
-    assert!(told.contains("EoE: no network interface"), "{told}");
+    assert!(reports.contains("EoE: no network interface"), "{reports}");
 }

@@ -40,7 +40,7 @@ struct Findings {
 
 impl Findings {
     /// The exit status and the last line of a command.
-    fn judge(&mut self, line: &str, child: Child, status: i32, expected: &str) {
+    fn evaluate(&mut self, line: &str, child: Child, status: i32, expected: &str) {
         let output = finish(child);
         let (text, errors) = said(&output);
         let last = |text: &str| text.trim_end().lines().last().unwrap_or_default().to_owned();
@@ -135,9 +135,9 @@ impl Drop for SmallDisk {
 }
 
 /// Checks each situation on the simulated segment, and restores it.
-fn judge_all(bench: &Bench, situations: &[(String, Happens, &str)], findings: &mut Findings) {
+fn evaluate_all(bench: &Bench, situations: &[(String, Happens, &str)], findings: &mut Findings) {
     for (line, happens, expected) in situations {
-        findings.judge(line, start(bench, line, happens), 1, expected);
+        findings.evaluate(line, start(bench, line, happens), 1, expected);
         restore(bench, happens);
         // SubDevices behind a cut cable cannot be stopped, except through the other side of a ring.
         let is_out_of_reach =
@@ -177,7 +177,7 @@ fn failures_in_a_ring_are_in_the_last_line_and_the_exit_status() {
         ),
     ];
     let mut findings = Findings::default();
-    judge_all(&bench, &situations, &mut findings);
+    evaluate_all(&bench, &situations, &mut findings);
     // Without an event. A stall of this machine may still cost a frame, which is then reported.
     let output = bench.ringcat(&words(&format!("run {ring} --for 300ms")));
     let (text, errors) = said(&output);
@@ -198,9 +198,9 @@ fn failures_on_one_interface_are_in_the_last_line_and_the_exit_status() {
         (run.clone(), Order("cut 2-3"), "FAILED: ...cycles incomplete...SubDevice 3 "),
     ];
     let mut findings = Findings::default();
-    judge_all(&bench, &situations, &mut findings);
+    evaluate_all(&bench, &situations, &mut findings);
     let mut nothing = |bench: &Bench, line: &str, status, expected: &str| {
-        findings.judge(line, bench.start_ringcat(&words(line)), status, expected);
+        findings.evaluate(line, bench.start_ringcat(&words(line)), status, expected);
     };
     let machine = concat!(env!("CARGO_MANIFEST_DIR"), "/../ringcat/examples/machine.eni.xml");
     nothing(&bench, &format!("run --main main0 --eni {machine}"), 2, "FAILED: the network is not the one of the file");
@@ -238,7 +238,7 @@ fn only_capture_starts_beside_a_main_device_which_stays_in_op() {
         "bench echo --main main0",
     ] {
         let line = if line.starts_with("bench round-trip") { "bench round-trip --main main0 --count 10" } else { line };
-        findings.judge(
+        findings.evaluate(
             line,
             bench.start_ringcat(&words(line)),
             2,
@@ -249,12 +249,17 @@ fn only_capture_starts_beside_a_main_device_which_stays_in_op() {
     let file = std::env::temp_dir().join(format!("ringcat-beside-{}.pcapng", std::process::id()));
     let line = format!("capture --main main0 --out {} --for 300ms", file.display());
     let program = crate::bench::program("ringcat");
-    findings.judge(&line, bench.start(&program, &words(&line)), 0, "ok: ");
+    findings.evaluate(&line, bench.start(&program, &words(&line)), 0, "ok: ");
     std::fs::remove_file(&file).expect("it was written");
     // A second simulator would return each frame a second time.
     let segment = concat!(env!("CARGO_MANIFEST_DIR"), "/../sim/segments/demo.toml");
     let line = format!("sim --main sim0 --segment {segment}");
-    findings.judge(&line, bench.start_at_sim(&program, &words(&line)), 2, "FAILED: process ... uses EtherCAT on sim0");
+    findings.evaluate(
+        &line,
+        bench.start_at_sim(&program, &words(&line)),
+        2,
+        "FAILED: process ... uses EtherCAT on sim0",
+    );
     assert_eq!(states(&bench, "OP"), SUBDEVICES);
     let (output, errors) = owner.interrupt();
     assert!(!output.contains("no longer answers") && !output.contains("SAFEOP"), "{output}{errors}");
@@ -275,7 +280,7 @@ fn a_main_device_in_another_namespace_is_found_by_its_frames() {
     let mut findings = Findings::default();
     for line in ["scan --main main1", "run --main main1 --for 1s", "ring --main main1"] {
         let expected = "FAILED: another MainDevice controls this segment: its frames, from ... arrive on main1";
-        findings.judge(line, bench.start_other_ringcat(&words(line)), 2, expected);
+        findings.evaluate(line, bench.start_other_ringcat(&words(line)), 2, expected);
     }
     drop(owner);
     findings.assert_none();
@@ -287,7 +292,7 @@ fn an_empty_cable_and_an_open_ring_are_in_the_last_line() {
     let Some(mut bench) = Bench::new(2) else { return };
     let mut findings = Findings::default();
     let mut nothing = |bench: &Bench, line: &str, status, expected: &str| {
-        findings.judge(line, bench.start_ringcat(&words(line)), status, expected);
+        findings.evaluate(line, bench.start_ringcat(&words(line)), status, expected);
     };
     for command in ["run", "ring", "bench rate"] {
         nothing(&bench, &format!("{command} --main main0"), 2, "FAILED: ...no frame returns");
@@ -319,7 +324,12 @@ fn a_bus_with_more_subdevices_than_the_eni_runs_and_exits_with_1() {
     std::fs::write(&file, COUPLER_ALONE).expect("the temporary directory is writable");
     let line = format!("run --main main0 --for 300ms --within 5s --eni {}", file.display());
     let mut findings = Findings::default();
-    findings.judge(&line, bench.start_ringcat(&words(&line)), 1, "FAILED: ...the file lacks 4 SubDevices of the bus");
+    findings.evaluate(
+        &line,
+        bench.start_ringcat(&words(&line)),
+        1,
+        "FAILED: ...the file lacks 4 SubDevices of the bus",
+    );
     std::fs::remove_file(&file).expect("it was written");
     findings.assert_none();
 }

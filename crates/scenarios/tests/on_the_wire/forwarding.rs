@@ -52,8 +52,9 @@ fn the_active_runs_its_ring_through_the_standby_with_each_kind_of_cut() {
             switch(&bench, is_cut);
             std::thread::sleep(PAUSE);
             let lines = run.said().between(begin, Instant::now());
-            let told = lines.iter().filter(|(_, line)| line.contains("ring open:") || line.contains("Line is fixed"));
-            assert_eq!(told.count(), 1, "{what}, cut: {is_cut}: {lines:?}");
+            let reports =
+                lines.iter().filter(|(_, line)| line.contains("ring open:") || line.contains("Line is fixed"));
+            assert_eq!(reports.count(), 1, "{what}, cut: {is_cut}: {lines:?}");
             assert_eq!(states(&bench, "OP"), 10, "{what}, cut: {is_cut}: {}", bench.order("status"));
         }
     }
@@ -132,8 +133,8 @@ fn the_guard_of_a_standby_that_is_killed_or_stopped_leaves_the_active_a_line() {
             }
             let (said, errors) = second.finish(START_LIMIT);
             assert!(errors.contains("its interfaces are switched off, the ACTIVE has a line"), "{said}{errors}");
-            let is_told = said.contains("FAILED: the guard has switched both off");
-            assert_eq!(is_told, signal == "-STOP", "{said}{errors}");
+            let is_reported = said.contains("FAILED: the guard has switched both off");
+            assert_eq!(is_reported, signal == "-STOP", "{said}{errors}");
             let begin = Instant::now();
             second = start_standby(&bench);
             std::thread::sleep(PAUSE);

@@ -99,7 +99,7 @@ fn a_ring_of_16_at_1_khz_loses_no_frame_that_the_simulator_did_not_drop() {
         assert_eq!((link.arrived, link.outside), (link.inside, link.answered), "all went in and out: {link:?}");
         assert_eq!(link.unanswered, 0, "all could be sent: {link:?}");
     }
-    assert_eq!(lost_inside, 2 * DROPPED, "the simulator dropped what it was told to: {status}");
+    assert_eq!(lost_inside, 2 * DROPPED, "the simulator dropped what it was ordered to: {status}");
     assert_eq!(sum(|link| link.inside) - lost_inside, sum(|link| link.outside), "the segment lost nothing else");
     let dropped = lost_inside + sum(|link| link.arrived_overrun);
     // A dropped frame may have been an acyclic one.

@@ -26,9 +26,9 @@ const OF_OTHERS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/on_the_wire/
 
 fn run(bench: &Bench, python: &Path, arguments: &[&str]) -> String {
     let output = finish(bench.start(python, arguments));
-    let (told, errors) = said(&output);
-    assert!(output.status.success(), "{told}{errors}");
-    told
+    let (reports, errors) = said(&output);
+    assert!(output.status.success(), "{reports}{errors}");
+    reports
 }
 
 /// Output of tshark for the packets that match a filter.
@@ -50,9 +50,9 @@ fn independent_clients_read_dictionaries_and_files_through_the_gateway() {
     let sniffer = bench.start(Path::new("tshark"), &["-q", "-i", "lo", "-w", capture.path()]);
     std::thread::sleep(PAUSE + Duration::from_millis(700));
     let python3 = Path::new("python3");
-    let told = run(&bench, python3, &[NO_CACHE, CLIENT, "good", ADDRESS, STATION]);
-    println!("{told}");
-    assert_eq!((told.matches(" objects, ").count(), told.matches(" ok\n").count()), (2, 3));
+    let reports = run(&bench, python3, &[NO_CACHE, CLIENT, "good", ADDRESS, STATION]);
+    println!("{reports}");
+    assert_eq!((reports.matches(" objects, ").count(), reports.matches(" ok\n").count()), (2, 3));
     interrupt(sniffer);
     let malformed = packets(capture.path(), "_ws.malformed");
     assert!(malformed.is_empty(), "{malformed:?}");
@@ -61,14 +61,14 @@ fn independent_clients_read_dictionaries_and_files_through_the_gateway() {
         println!("tshark: {answers} answers over {kind}");
         assert!(answers > 500, "{answers} answers over {kind}");
     }
-    let told = run(&bench, python3, &[NO_CACHE, CLIENT, "bad", ADDRESS, STATION]);
-    println!("{told}");
-    assert_eq!((told.matches("error reply").count(), told.matches(" ok\n").count()), (3, 2));
+    let reports = run(&bench, python3, &[NO_CACHE, CLIENT, "bad", ADDRESS, STATION]);
+    println!("{reports}");
+    assert_eq!((reports.matches("error reply").count(), reports.matches(" ok\n").count()), (3, 2));
     if is_asked_for(FOREIGN)
         && let Some(python) = python()
     {
-        let told = run(&bench, &python, &[NO_CACHE, OF_OTHERS, ADDRESS]);
-        let object = |index: &str| told.lines().find(|line| line.starts_with(index)).unwrap_or_default().to_owned();
+        let reports = run(&bench, &python, &[NO_CACHE, OF_OTHERS, ADDRESS]);
+        let object = |index: &str| reports.lines().find(|line| line.starts_with(index)).unwrap_or_default().to_owned();
         println!("{}\n{}\n{}", object("0x8001"), object("0xa001"), object("0xf120"));
         for (index, fields) in [
             ("0x1008", "'DeviceName': 'RingCAT'"),
@@ -86,8 +86,8 @@ fn independent_clients_read_dictionaries_and_files_through_the_gateway() {
             ("0xf020", "'ConfiguredAddress': [4097, 4098, 0,"),
             ("0xf120", "'MasterState': 8"),
         ] {
-            let told = object(index);
-            assert!(told.contains(fields), "{fields} in {told}");
+            let reports = object(index);
+            assert!(reports.contains(fields), "{fields} in {reports}");
         }
     }
     let (output, errors) = gateway.interrupt();

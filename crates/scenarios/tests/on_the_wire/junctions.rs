@@ -82,7 +82,7 @@ fn a_local_ring_break_and_repair_are_reported_in_both_junction_modes() {
             assert!(!output.contains(trouble), "{mode}: {output}{errors}");
         }
         assert!(output.contains("stopped: outputs zero, all SubDevices in INIT"), "{mode}: {output}{errors}");
-        println!("--junction {mode}: three cables cut and mended, each told once with both ends");
+        println!("--junction {mode}: three cables cut and mended, each reported once with both ends");
     }
 }
 
@@ -111,8 +111,8 @@ fn enhanced_detection_takes_the_redundant_interface_down_and_brings_it_back() {
         bench.links_main()
     );
     let (output, errors) = run.interrupt();
-    for told in ["ring open", "cannot be taken down"] {
-        assert!(!output.contains(told), "a controlled break is not told: {output}{errors}");
+    for reports in ["ring open", "cannot be taken down"] {
+        assert!(!output.contains(reports), "a controlled break is not reported: {output}{errors}");
     }
     println!("{downs} times the redundant interface was taken down and came back");
     assert!(output.contains("stopped: outputs zero, all SubDevices in INIT"), "{output}{errors}");

@@ -203,15 +203,15 @@ fn modified_mail_is_found() {
     let (fine, said) = check(&path, 4);
     assert!(fine, "{said}");
     let mails = written(&original);
-    let judged = |capture: &Capture| {
+    let evaluated = |capture: &Capture| {
         write(capture, &path);
         check(&path, 4)
     };
     let expect = |capture: &Capture, finding: &str| {
-        let (fine, said) = judged(capture);
+        let (fine, said) = evaluated(capture);
         assert!(!fine && said.contains(finding), "expected \"{finding}\": {said}");
     };
-    assert!(judged(&original).0, "unchanged, it has no findings");
+    assert!(evaluated(&original).0, "unchanged, it has no findings");
     // A counter of a written mail.
     let mut tampered = original.clone();
     for (packet, at) in &mails[3] {

@@ -94,11 +94,11 @@ fn a_ring_cable_at_another_interface_is_reported_with_its_name() {
     let Some(mut bench) = Bench::new(2) else { return };
     bench.simulate(&RING_OF_16.segment(), true);
     for command in ["scan", "run"] {
-        let told = error_of(&bench, &[command, "--main", "main0"]);
-        assert!(told.contains("frames sent on main0 arrive on main1: a cable of this segment"), "{told}");
+        let reports = error_of(&bench, &[command, "--main", "main0"]);
+        assert!(reports.contains("frames sent on main0 arrive on main1: a cable of this segment"), "{reports}");
         let advice = "they arrive on main1; add --redundant main1 to run a ring, or unplug that cable";
-        assert!(told.contains(&format!("scan: no frame returns, {advice}")), "{told}");
-        assert!(!told.contains("another MainDevice"), "{told}");
+        assert!(reports.contains(&format!("scan: no frame returns, {advice}")), "{reports}");
+        assert!(!reports.contains("another MainDevice"), "{reports}");
     }
     // The same with marks in other bytes of the source address.
     let marked = error_of(&bench, &["scan", "--main", "main0", "--source-address", "id-last"]);

@@ -1,5 +1,5 @@
 //! Two MainDevices of the library at one ring, each a program on its host: they join, follow, take over and hand the
-//! role over. Judged from inside the SubDevices.
+//! role over. Evaluated from inside the SubDevices.
 
 use std::time::Duration;
 

@@ -1,5 +1,5 @@
 //! Two MainDevices of the library, each with its halves in two threads, at one ring in real time. What depends on the
-//! load of the machine is not judged: no output goes back, each state is reached in the end, and cycles in both roles
+//! load of the machine is not checked: no output goes back, each state is reached in the end, and cycles in both roles
 //! and with both changes of role neither allocate nor free memory.
 
 use std::ops::ControlFlow;

@@ -49,10 +49,10 @@ fn an_absent_branch_is_never_reported_as_the_break_of_the_ring() {
         assert_eq!(world.application().ring_status().place, Some(cable(number)));
         world.heal(CableId(number));
         world.run_cycles(100);
-        let told = ring_events(world.events(mark));
+        let reports = ring_events(world.events(mark));
         assert!(
-            matches!(told.last(), Some(Event::RingClosed { place: Some(it), .. }) if *it == cable(number)),
-            "{told:?}"
+            matches!(reports.last(), Some(Event::RingClosed { place: Some(it), .. }) if *it == cable(number)),
+            "{reports:?}"
         );
     }
 }
@@ -106,8 +106,8 @@ fn each_of_two_breaks_is_reported_once_with_its_place() {
         world.cut(CableId(second));
         world.run_cycles(200);
         // The cable of an interface cannot be located if no SubDevice behind it responds.
-        let told: &[Cable] = if [0, 16].contains(&second) { &[one] } else { &[one, other] };
-        assert_eq!(places(&world, mark), told, "{first} and {second}");
+        let reports: &[Cable] = if [0, 16].contains(&second) { &[one] } else { &[one, other] };
+        assert_eq!(places(&world, mark), reports, "{first} and {second}");
         world.heal(CableId(first));
         world
             .until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
@@ -116,9 +116,12 @@ fn each_of_two_breaks_is_reported_once_with_its_place() {
         assert_eq!(world.application().ring_status().place, Some(other));
         world.heal(CableId(second));
         world.run_cycles(50);
-        let told = ring_events(world.events(mark));
-        assert!(matches!(told.last(), Some(Event::RingClosed { place: Some(it), .. }) if *it == other), "{told:?}");
-        assert_eq!(told.len(), 4, "{told:?}");
+        let reports = ring_events(world.events(mark));
+        assert!(
+            matches!(reports.last(), Some(Event::RingClosed { place: Some(it), .. }) if *it == other),
+            "{reports:?}"
+        );
+        assert_eq!(reports.len(), 4, "{reports:?}");
     }
 }
 
@@ -133,6 +136,6 @@ fn a_subdevice_without_power_is_two_breaks() {
     world.power_on(DeviceIndex(6));
     world.until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
     world.run_cycles(50);
-    let told = ring_events(world.events(mark));
-    assert!(matches!(told[..], [Event::RingOpened { .. }, _, _, Event::RingClosed { .. }]), "{told:?}");
+    let reports = ring_events(world.events(mark));
+    assert!(matches!(reports[..], [Event::RingOpened { .. }, _, _, Event::RingClosed { .. }]), "{reports:?}");
 }

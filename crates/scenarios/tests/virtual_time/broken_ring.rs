@@ -160,7 +160,7 @@ fn two_breaks_isolate_a_part_which_returns_without_further_losses() {
                 let lost = |event: &Event| *event == Event::Lost { subdevice: SubDeviceId(subdevice) };
                 world.until(Duration::from_millis(60), "all of the piece are lost", |world| world.saw(mark, lost));
             }
-            let stale = &world.judged(mark).last().expect("cycles went by").stale;
+            let stale = &world.evaluated(mark).last().expect("cycles went by").stale;
             assert!(stale.iter().all(|left| isolated.contains(left)), "{stale:?}: the others continue");
             let healing = world.mark();
             world.heal(CableId(first));
@@ -170,7 +170,7 @@ fn two_breaks_isolate_a_part_which_returns_without_further_losses() {
             world.run_cycles(50);
             world.heal(CableId(second));
             world.run_cycles(50);
-            assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete));
+            assert_eq!(world.evaluated(mark).last().map(|evaluated| evaluated.delivery), Some(Delivery::Complete));
             let left: Vec<usize> = world.left_op(mark).iter().map(|device| device.0).collect();
             assert!(left.iter().all(|left| isolated.contains(left)), "{left:?} left OP, {isolated:?} were isolated");
             for subdevice in 0..SIXTEEN.len() {
@@ -182,9 +182,9 @@ fn two_breaks_isolate_a_part_which_returns_without_further_losses() {
                     .filter(|timed| timed.event == Event::Returned { subdevice: SubDeviceId(subdevice) });
                 assert_eq!(returned.count(), usize::from(isolated.contains(&subdevice)), "{subdevice}");
             }
-            let told = ring_events(world.events(healing));
-            let Some(Event::RingClosed { main: COUNT, redundant: 0, place: Some(place) }) = told.last() else {
-                panic!("{told:?}")
+            let reports = ring_events(world.events(healing));
+            let Some(Event::RingClosed { main: COUNT, redundant: 0, place: Some(place) }) = reports.last() else {
+                panic!("{reports:?}")
             };
             assert_eq!(*place, cable_of_ring(second, 16));
         }

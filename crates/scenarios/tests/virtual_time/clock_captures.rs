@@ -83,15 +83,21 @@ enum Case {
 
 impl Cases {
     /// The script must have no finding, and report this amount of checks.
-    fn fine(&mut self, name: &'static str, network: Network, judged: &'static str, work: impl FnOnce(&mut Recorded)) {
+    fn fine(
+        &mut self,
+        name: &'static str,
+        network: Network,
+        evaluated: &'static str,
+        work: impl FnOnce(&mut Recorded),
+    ) {
         let path = file();
         let options = Options::default().with_junctions(JunctionMode::Automatic);
         recorded(&options, network, &path, work);
-        self.all.push((path, Case::Fine(name, judged)));
+        self.all.push((path, Case::Fine(name, evaluated)));
     }
 
     /// Checks all captures.
-    fn judge(self) {
+    fn evaluate(self) {
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../ci/check-clocks");
         let paths = self.all.iter().map(|(path, _)| path);
         let output = Command::new(script).args(paths).output().expect("env is everywhere");
@@ -108,9 +114,12 @@ impl Cases {
             let said = said.unwrap_or_else(|| panic!("nothing is said of {}: {text}", path.display()));
             let said = said.split("\nfile: ").next().unwrap_or_default();
             match case {
-                Case::Fine(name, judged) => {
+                Case::Fine(name, evaluated) => {
                     println!("{name}\n{said}");
-                    assert!(said.contains("findings: 0") && said.contains(judged), "{name}: expected {judged}\n{said}");
+                    assert!(
+                        said.contains("findings: 0") && said.contains(evaluated),
+                        "{name}: expected {evaluated}\n{said}"
+                    );
                 }
                 Case::Finding(finding) => {
                     assert!(!said.contains("findings: 0") && said.contains(finding), "expected \"{finding}\": {said}");
@@ -179,7 +188,7 @@ fn written_delays_and_offsets_match_the_capture() {
     broken.cut(CableId(3));
     broken.advance_by(Duration::from_millis(1));
     cases.fine("broken ring", broken, "checked: 8 delays", |_| ());
-    cases.judge();
+    cases.evaluate();
 }
 
 // covers: 7.5, dc-tools
@@ -202,7 +211,7 @@ fn clocks_of_a_ring_that_breaks_and_of_a_subdevice_that_returns_keep_their_delay
         settle(run);
         cycles(run, 50);
     });
-    cases.judge();
+    cases.evaluate();
 }
 
 fn apply(run: &mut Recorded, fault: Fault) {
@@ -244,7 +253,7 @@ fn captures_with_crossed_subdevices_and_clockless_forks_are_checked() {
     let mut cases = Cases::default();
     cases.fine("crossed", crossed(), "checked: 6 delays", |_| ());
     cases.fine("fork without a clock", fork(), "checked: 6 delays", |_| ());
-    cases.judge();
+    cases.evaluate();
 }
 
 // covers: 7.5, 9.4, dc-tools
@@ -269,7 +278,7 @@ fn captures_of_rings_behind_junctions_are_checked() {
         apply(run, Fault::Heal(CableId(3)));
         cycles(run, 100);
     });
-    cases.judge();
+    cases.evaluate();
 }
 
 /// Called for a datagram: whether it was sent, command, register, the bytes from its header to its counter.
@@ -364,7 +373,7 @@ fn modified_delays_are_found_crossed_behind_forks_and_in_rings() {
         cycles(run, 100);
     });
     tampering.add_longer(&mut cases, "ns is what was measured", &[0x1004], 0x0928, 30);
-    cases.judge();
+    cases.evaluate();
 }
 
 // covers: dc-tools
@@ -410,5 +419,5 @@ fn modified_clock_set_ups_are_found() {
             bytes[10..14].fill(0);
         }
     });
-    cases.judge();
+    cases.evaluate();
 }

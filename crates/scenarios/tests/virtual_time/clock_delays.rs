@@ -42,8 +42,8 @@ fn longer_processing_than_forwarding_is_an_error_of_delays_unless_declared() {
     let mut options = NetworkOptions::default();
     options.processing_delay = options.forwarding_delay + Duration::from_nanos(LONGER);
     let hop = HOP_NS - 300 + options.processing_delay.as_nanos() as i64;
-    for (told, systematic) in [(0, 20), (LONGER as u16, 0)] {
-        let config = config().with_passage(Passage::new(told, 0));
+    for (reports, systematic) in [(0, 20), (LONGER as u16, 0)] {
+        let config = config().with_passage(Passage::new(reports, 0));
         let mut world = world(1, line(clocked(COUNT, 50), options.clone()), config);
         world.until(Duration::from_secs(1), "set up", |world| delay(world.network(), COUNT - 1) != 0);
         world.run_cycles(10);
@@ -51,7 +51,10 @@ fn longer_processing_than_forwarding_is_an_error_of_delays_unless_declared() {
             // Frames are looped back behind the processing unit of the last SubDevice: its cable is right in any case.
             let missed = systematic * device.min(COUNT - 2) as i64;
             let error = i64::from(delay(world.network(), device)) - hop * device as i64 + missed;
-            assert!(error.abs() <= 10 + (100.0 * device as f64).sqrt() as i64, "device {device}, {told}: {error} ns");
+            assert!(
+                error.abs() <= 10 + (100.0 * device as f64).sqrt() as i64,
+                "device {device}, {reports}: {error} ns"
+            );
         }
     }
 }
@@ -71,11 +74,11 @@ fn types_with_configured_passage_times_have_exact_delays() {
         }
         all
     };
-    let errors = |told: &[(u64, u64)]| -> Vec<i64> {
+    let errors = |reports: &[(u64, u64)]| -> Vec<i64> {
         let network = line(descriptions(), NetworkOptions::default());
         let mut world = World::with(1, network, &Options::default(), |scan| {
             let mut declaration = with_clocks(scan, config());
-            for (subdevice, (processing, forwarding)) in declaration.subdevices.iter_mut().zip(told) {
+            for (subdevice, (processing, forwarding)) in declaration.subdevices.iter_mut().zip(reports) {
                 let passage = Passage::new(*processing as u16, *forwarding as u16);
                 subdevice.passage = Some(passage);
             }
@@ -92,9 +95,9 @@ fn types_with_configured_passage_times_have_exact_delays() {
         };
         PASSAGES.iter().enumerate().map(error).collect()
     };
-    let (untold, told) = (errors(&[]), errors(&PASSAGES));
-    assert!(untold[1] <= -195 && untold.iter().map(|error| error.abs()).max() > Some(200), "{untold:?}");
-    assert!(told.iter().all(|error| error.abs() <= 2), "{told:?}");
+    let (unreported, reports) = (errors(&[]), errors(&PASSAGES));
+    assert!(unreported[1] <= -195 && unreported.iter().map(|error| error.abs()).max() > Some(200), "{unreported:?}");
+    assert!(reports.iter().all(|error| error.abs() <= 2), "{reports:?}");
 }
 
 /// The longest line. The lock and spread of 200 clocks are among the figures (bin `figures`, clocks).

@@ -94,7 +94,7 @@ fn with_frames_on_the_wire_all_the_time_cycles_pause_or_nothing_is_written() {
             let error = largest_error(&world, 1..COUNT);
             assert!(error <= 60 && !world.saw(mark, not_measured), "{text}, cut: {error} ns");
         } else {
-            world.until(Duration::from_secs(1), "it is told", |world| world.saw(mark, not_measured));
+            world.until(Duration::from_secs(1), "it is reported", |world| world.saw(mark, not_measured));
             assert!(!is_set_up(&world) && world.application().pace().paused == 0, "{text}");
         }
     }

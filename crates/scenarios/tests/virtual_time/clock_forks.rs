@@ -27,12 +27,12 @@ fn hop(cable: i64) -> i64 {
     300 + 50 + 70 * (cable * 5 % 11)
 }
 
-fn delays_told(world: &World) -> Vec<(Position, Option<Position>)> {
-    let told = |timed: &ringcat::TimedEvent| match timed.event {
+fn delays_reported(world: &World) -> Vec<(Position, Option<Position>)> {
+    let reports = |timed: &ringcat::TimedEvent| match timed.event {
         Event::DelayUnknown { position, fork, .. } => Some((position, fork)),
         _ => None,
     };
-    world.events(world.beginning()).iter().filter_map(told).collect()
+    world.events(world.beginning()).iter().filter_map(reports).collect()
 }
 
 /// A clock, a splitter without a clock, two clocks on its port 3, one on its port 1, and on port 2 another splitter
@@ -54,7 +54,7 @@ fn delays_behind_splitters_without_a_clock_are_those_of_the_cables() {
     let mut world = world(&SPLITTERS, &[1, 5], config());
     world.until(Duration::from_secs(8), "everything in OP", World::all_in_op);
     lock(&mut world, Duration::from_secs(8));
-    assert_eq!(delays_told(&world), []);
+    assert_eq!(delays_reported(&world), []);
     let there_and_back = |cables: &[i64]| 2 * cables.iter().map(|cable| hop(*cable)).sum::<i64>();
     let first = hop(1) + hop(2);
     let second = hop(1) + there_and_back(&[2, 3]) + hop(4);
@@ -72,7 +72,7 @@ fn delays_behind_splitters_without_a_clock_are_those_of_the_cables() {
     world.run_cycles(200);
     world.heal(CableId(2));
     world.run_cycles(1_500);
-    assert_eq!(delays_told(&world), []);
+    assert_eq!(delays_reported(&world), []);
     let error = i64::from(delay(world.network(), 4)) - second;
     assert!(error.abs() <= 20, "{error} ns from {second} ns");
 }
@@ -88,7 +88,7 @@ fn an_unknown_delay_behind_a_splitter_at_the_head_is_reported() {
         world.until(Duration::from_secs(8), "everything in OP", World::all_in_op);
         lock(&mut world, Duration::from_secs(8));
         let hidden: Vec<_> = [3, 4].map(|position| (Position(position), Some(Position(0)))).to_vec();
-        assert_eq!(delays_told(&world), hidden);
+        assert_eq!(delays_reported(&world), hidden);
         let error = i64::from(delay(world.network(), 2)) - hop(2);
         assert!(error.abs() <= 20, "{error} ns");
         assert_eq!([3, 4].map(|device| delay(world.network(), device)), [0; 2]);
@@ -97,7 +97,7 @@ fn an_unknown_delay_behind_a_splitter_at_the_head_is_reported() {
         assert_eq!(is_hidden, [false, false, true, true]);
         // After a long time it is not reported again.
         world.run_cycles(2_000);
-        assert_eq!(delays_told(&world).len(), 2);
+        assert_eq!(delays_reported(&world).len(), 2);
     }
 }
 
@@ -119,13 +119,13 @@ fn a_delay_with_known_limits_is_estimated_on_request() {
         late.into_iter().for_each(|cable| application.links_mut().network_mut().heal(cable));
         (0..6_000).for_each(|_| application.cycle(|_| ()));
         let events: Vec<Event> = core::iter::from_fn(|| application.pop_event()).map(|timed| timed.event).collect();
-        let mut told = Vec::new();
+        let mut reports = Vec::new();
         for event in &events {
             let Event::DelayUnknown { position, range: Some(range), is_estimated, .. } = event else { continue };
-            told.push((usize::from(position.0), (range.least_ns, range.most_ns), *is_estimated));
+            reports.push((usize::from(position.0), (range.least_ns, range.most_ns), *is_estimated));
         }
-        assert!(!told.is_empty(), "{events:?}");
-        for (device, (least, most), is_estimated) in told {
+        assert!(!reports.is_empty(), "{events:?}");
+        for (device, (least, most), is_estimated) in reports {
             let what = format!("device {device}, {least} to {most} ns");
             assert_eq!(is_estimated, estimated_delays, "{what}");
             let there_and_back = |cables: &[i64]| 2 * cables.iter().map(|cable| hop(*cable)).sum::<i64>();
@@ -161,12 +161,12 @@ fn a_subdevice_with_sync0_and_unknown_delay_stays_in_safeop() {
     .expect("it comes up");
     let reason = "its propagation delay is not known, since the fork at position 0 has no clock";
     world.run_cycles(6_000);
-    let told = world
+    let reports = world
         .events(world.beginning())
         .iter()
         .map(|timed| ringcat::text::describe(timed, &ringcat::text::Names::default()));
-    let told: Vec<String> = told.collect();
-    assert!(told.iter().any(|line| line.contains(reason)), "{told:#?}");
+    let reports: Vec<String> = reports.collect();
+    assert!(reports.iter().any(|line| line.contains(reason)), "{reports:#?}");
     let state = |device: usize| {
         world.network().device(DeviceIndex(device)).controller.register(ringcat_wire::register::map::AL_STATUS, 1)[0]
     };

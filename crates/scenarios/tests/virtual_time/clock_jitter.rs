@@ -49,10 +49,10 @@ fn a_reference_that_was_power_cycled_is_back_in_op_within_5_s_at_any_host_jitter
             .until(Duration::from_millis(4_800), &text, |world| world.all_in_op() && world.application().all_settled());
         let back = world.now() - begin;
         let [apart, apart_others] = watch(&mut world, [&clocks, &others], 3_000);
-        let told = window_events(&world, mark);
-        println!("{text}: back after {} ms, {apart} ns apart, {told} times told", back.as_millis());
+        let reports = window_events(&world, mark);
+        println!("{text}: back after {} ms, {apart} ns apart, {reports} times reported", back.as_millis());
         // Clocks behind the reference are exact; the clock in front of it receives the host's prediction.
-        assert!(apart <= 1_000 && told <= 6, "{text}: {apart} ns apart, {told} times told");
+        assert!(apart <= 1_000 && reports <= 6, "{text}: {apart} ns apart, {reports} times reported");
         assert!(closed || apart_others <= 100, "{text}: {apart_others} ns");
     }
 }

@@ -189,8 +189,8 @@ fn clocks_that_leave_their_window_and_return_are_reported() {
             bytes,
         );
         for inside in [false, true] {
-            let told = |event: &Event| matches!(event, Event::SyncWindow { inside: of, .. } if *of == inside);
-            world.until(Duration::from_secs(4), "the window", |world| world.saw(mark, told));
+            let reports = |event: &Event| matches!(event, Event::SyncWindow { inside: of, .. } if *of == inside);
+            world.until(Duration::from_secs(4), "the window", |world| world.saw(mark, reports));
         }
         drop(written);
     }

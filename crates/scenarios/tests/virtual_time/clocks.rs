@@ -115,13 +115,13 @@ fn without_lock_a_subdevice_with_sync_stays_in_safeop_with_an_error() {
     .expect("it can be activated");
     let mark = world.beginning();
     world.run_cycles(2_500);
-    let told = |event: &Event| match event {
+    let reports = |event: &Event| match event {
         Event::ConfigurationFailed { subdevice: SubDeviceId(0), reason } => reason.starts_with(
             "the clock of position 2 did not lock within 2000 ms: expected a difference of at most 100 ns",
         ),
         _ => false,
     };
-    assert!(world.saw(mark, told));
+    assert!(world.saw(mark, reports));
     assert!(!world.all_in_op());
 }
 
@@ -132,8 +132,9 @@ fn a_reference_that_the_application_chooses_is_followed() {
     let mut world = world(5, line(clocked(6, 30), NetworkOptions::default()), chosen);
     let mark = world.beginning();
     world.run_cycles(2_500);
-    let told = |event: &Event| matches!(event, Event::ReferenceClock { position: Some(position) } if position.0 == 2);
-    assert!(world.saw(mark, told));
+    let reports =
+        |event: &Event| matches!(event, Event::ReferenceClock { position: Some(position) } if position.0 == 2);
+    assert!(world.saw(mark, reports));
     let behind: Vec<usize> = (2..6).collect();
     assert!(spread(world.network(), &behind) <= 100);
     // Clocks before it follow the time that the host predicts.

@@ -1,4 +1,4 @@
-//! Reports of single datagrams whose working counters differ; judged by the frames on the links.
+//! Reports of single datagrams whose working counters differ; evaluated by the frames on the links.
 
 use std::collections::BTreeMap;
 use std::time::Duration;

@@ -114,11 +114,11 @@ fn a_duplicate_alias_is_an_event_and_an_error_if_it_is_declared() {
     let network = || ring(devices.clone(), NetworkOptions::default());
     let mut world = declared(network(), |_, config| config);
     world.settle();
-    let told = |event: &Event| {
+    let reports = |event: &Event| {
         matches!(event, Event::DuplicateAlias { alias: 99, first, second }
         if (first.0, second.0) == (3, 9))
     };
-    assert!(world.saw(world.beginning(), told));
+    assert!(world.saw(world.beginning(), reports));
     let text = refused(network(), |number, config| match number {
         3 => SubDeviceConfig::at_alias(99, 0),
         _ => config,
@@ -208,11 +208,11 @@ fn a_download_too_long_for_the_object_is_reported_and_retried() {
         _ => config,
     });
     world.run_cycles(300);
-    let told = |event: &Event| {
+    let reports = |event: &Event| {
         matches!(event, Event::ConfigurationFailed { subdevice: SubDeviceId(3), reason }
             if reason.contains("SDO 0x8000:03: aborted by the SubDevice"))
     };
-    assert!(world.saw(world.beginning(), told));
+    assert!(world.saw(world.beginning(), reports));
 }
 
 type Outcome = Rc<RefCell<Vec<Result<Vec<u8>, SdoError>>>>;

@@ -35,7 +35,7 @@ fn world(seed: u64) -> World {
     let network = ring(descriptions(&KINDS), options);
     let mut world = World::with(seed, network, &Options::default(), declare).expect("activation");
     // Inputs are changed directly in the device.
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     world
 }
 

@@ -57,7 +57,7 @@ fn places(events: &[&Event]) -> Vec<Ends> {
 }
 
 /// Number of reports of each crossing, and of swapped interfaces.
-fn crossings_told(world: &World) -> (BTreeMap<Option<usize>, usize>, usize) {
+fn crossings_reported(world: &World) -> (BTreeMap<Option<usize>, usize>, usize) {
     let (mut crossed, mut swapped) = (BTreeMap::new(), 0);
     for timed in world.events(world.beginning()) {
         match &timed.event {
@@ -85,22 +85,22 @@ fn breaks_with_any_crossed_subdevices_have_their_place_and_are_reported_once() {
             let mark = world.mark();
             world.cut(CableId(number));
             world.run_cycles(60);
-            let told = ring_events(world.events(mark));
-            assert_eq!((places(&told), told.len()), (vec![expected.clone()], 2), "{what}: {told:?}");
+            let reports = ring_events(world.events(mark));
+            assert_eq!((places(&reports), reports.len()), (vec![expected.clone()], 2), "{what}: {reports:?}");
             assert_eq!(world.application().ring_status().place.map(ends), Some(expected), "{what}");
             let mark = world.mark();
             world.heal(CableId(number));
             world.run_cycles(60);
-            let told = ring_events(world.events(mark));
-            let [Event::RingClosed { place, .. }] = told[..] else { panic!("{what}: {told:?}") };
+            let reports = ring_events(world.events(mark));
+            let [Event::RingClosed { place, .. }] = reports[..] else { panic!("{what}: {reports:?}") };
             assert_eq!(place.map(ends), Some(plugged(&world, *cable)), "{what}");
         }
-        let (told, swapped) = crossings_told(&world);
-        assert!(told.values().all(|times| *times == 1), "crossed {crossed:04b}: {told:?}");
-        let named: usize = told.keys().flatten().map(|device| 1 << device).sum();
+        let (reports, swapped) = crossings_reported(&world);
+        assert!(reports.values().all(|times| *times == 1), "crossed {crossed:04b}: {reports:?}");
+        let named: usize = reports.keys().flatten().map(|device| 1 << device).sum();
         // Each is reported after the ring has been open; if all are crossed, there is one report.
         let expected = if crossed == ALL { (0, 1) } else { (crossed, 0) };
-        assert_eq!((named, swapped), expected, "crossed {crossed:04b}: {told:?}");
+        assert_eq!((named, swapped), expected, "crossed {crossed:04b}: {reports:?}");
     }
 }
 
@@ -116,12 +116,12 @@ fn a_ring_with_crossed_subdevices_broken_from_the_start_is_located() {
             let mut world = World::in_op(crossed as u64, network);
             world.run_cycles(30);
             let what = format!("crossed {crossed:04b}, cable {number}");
-            let told = ring_events(world.events(world.beginning()));
-            assert_eq!(places(&told), [plugged(&world, *cable)], "{what}: {told:?}");
-            let (told, swapped) = crossings_told(&world);
-            assert!(told.values().all(|times| *times == 1), "{what}: {told:?}");
-            let named: usize = told.keys().flatten().map(|device| 1 << device).sum();
-            assert_eq!((named, swapped), if crossed == ALL { (0, 1) } else { (crossed, 0) }, "{what}: {told:?}");
+            let reports = ring_events(world.events(world.beginning()));
+            assert_eq!(places(&reports), [plugged(&world, *cable)], "{what}: {reports:?}");
+            let (reports, swapped) = crossings_reported(&world);
+            assert!(reports.values().all(|times| *times == 1), "{what}: {reports:?}");
+            let named: usize = reports.keys().flatten().map(|device| 1 << device).sum();
+            assert_eq!((named, swapped), if crossed == ALL { (0, 1) } else { (crossed, 0) }, "{what}: {reports:?}");
         }
     }
 }
@@ -183,8 +183,8 @@ fn places_in_random_rings_with_branches_and_crossed_subdevices_are_right_or_unkn
         let truth: Vec<Ends> = cables.iter().map(|(a, b)| sorted(vec![end(*a), end(*b)])).collect();
         let nodes = |ends: &Ends| ends.iter().map(|end| end.map(|at| usize::from(at.position().0))).collect::<Vec<_>>();
         let mut note = |world: &World, mark, number: usize, what: &str| {
-            let told = ring_events(world.events(mark));
-            match &places(&told)[..] {
+            let reports = ring_events(world.events(mark));
+            match &places(&reports)[..] {
                 [] => unknown += 1,
                 [place] if *place == truth[number] => known += 1,
                 // If the port was never connected, the usual port is assumed.

@@ -120,7 +120,7 @@ fn exchanges(world: &mut World) {
     let entry = world.application().entry(SubDeviceId(DRIVE), 0x6041, 0).expect("the file says where it lies");
     assert_eq!((entry.bit_length, entry.bit_offset % 8), (16, 0));
     assert_eq!(troubles(world.events(world.beginning())), Vec::<&Event>::new());
-    let complete = world.judged(world.beginning()).last().map(|judged| judged.delivery);
+    let complete = world.evaluated(world.beginning()).last().map(|evaluated| evaluated.delivery);
     assert_eq!(complete, Some(Delivery::Complete));
     assert!(world.compared() > 0, "images are those of the devices");
 }

@@ -15,7 +15,7 @@ fn run(seed: u64) -> (Fingerprint, usize) {
     let options = NetworkOptions::default().with_seed(seed);
     let network = ring(descriptions(&SIXTEEN), options.with_detection_delay(Duration::from_micros(300)));
     let mut world = World::in_op(seed, network);
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     for _ in 0..10 {
         let (cable, device) = (CableId(dice.below(17) as usize), DeviceIndex(dice.below(16) as usize));
         world.corrupt(CableId(dice.below(17) as usize), 3);

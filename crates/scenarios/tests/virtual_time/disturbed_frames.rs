@@ -62,7 +62,7 @@ fn a_late_or_duplicated_frame_is_counted_and_never_treated_as_new() {
     for (seed, delay_us) in (0..).zip(delays_us) {
         let mut world = World::in_op(seed, ring_of_16(FAST));
         // Devices that process a late frame take its outputs.
-        world.judge_latched(false);
+        world.evaluate_latched(false);
         for cable in [0, 7, 16] {
             for direction in [Direction::AToB, Direction::BToA] {
                 let mark = world.mark();
@@ -98,7 +98,7 @@ fn a_domain_with_frames_under_way_is_skipped_and_counted() {
     let mut world = World::in_op(3, line(descriptions(&SIXTEEN), NetworkOptions::default()));
     patient(&mut world);
     world.run_cycles(5);
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     let mark = world.mark();
     let by = 3 * CYCLE + CYCLE / 2;
     world.fault(Fault::Delay { cable: CableId(3), direction: Some(Direction::AToB), count: 1, by });
@@ -164,7 +164,7 @@ fn an_own_frame_with_changed_datagrams_is_counted_as_corrupt() {
     }
     world.run_cycles(3);
     assert!(world.application().cyclic_counters().corrupt + world.application().cyclic_counters().late >= before + 256);
-    assert_eq!(world.judged(world.beginning()).last().map(|judged| judged.delivery), Some(Delivery::Complete));
+    assert_eq!(world.evaluated(world.beginning()).last().map(|evaluated| evaluated.delivery), Some(Delivery::Complete));
 }
 
 /// All SubDevices as found, with a longer cycle.

@@ -67,8 +67,8 @@ fn domains_with_different_periods_are_exchanged_at_their_own_rate() {
     let mark = world.mark();
     world.run_cycles(400);
     for (domain, expected) in [400, 100, 40].into_iter().enumerate() {
-        let judged = world.judged(mark).iter().filter(|judged| judged.domain == DomainId(domain)).count();
-        assert_eq!(judged, expected, "domain {domain}");
+        let evaluated = world.evaluated(mark).iter().filter(|evaluated| evaluated.domain == DomainId(domain)).count();
+        assert_eq!(evaluated, expected, "domain {domain}");
     }
     assert_eq!(world.incomplete(mark), 0);
     for cable in [0, 5, 16] {
@@ -106,11 +106,11 @@ fn outputs_and_inputs_of_one_subdevice_may_be_in_different_domains() {
         let mut world = World::with(4, network, &Options::default(), declare).expect("activation");
         world.settle();
         // The block copies outputs to inputs; its outputs are now newer than those that the slow domain read.
-        world.judge_latched(false);
+        world.evaluate_latched(false);
         let mark = world.mark();
         world.run_cycles(200);
         assert_eq!(world.incomplete(mark), 0);
-        assert_eq!(world.judged(mark).len(), 300);
+        assert_eq!(world.evaluated(mark).len(), 300);
     }
 }
 
@@ -143,7 +143,7 @@ fn an_optional_subdevice_that_is_absent_at_first_joins_when_it_appears() {
         world.saw(world.beginning(), |event| *event == Event::Missing { subdevice: SubDeviceId(2), optional: true })
     );
     assert_eq!(world.application().states()[2], SubDeviceState::Absent);
-    assert!(!world.judged(world.beginning()).last().expect("cycles went by").delivery.is_incomplete());
+    assert!(!world.evaluated(world.beginning()).last().expect("cycles went by").delivery.is_incomplete());
     let mark = world.mark();
     world.power_on(DeviceIndex(2));
     world.until(Duration::from_secs(1), "all in OP", |world| {
@@ -151,10 +151,10 @@ fn an_optional_subdevice_that_is_absent_at_first_joins_when_it_appears() {
     });
     world.recognise();
     world.run_cycles(50);
-    assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete));
+    assert_eq!(world.evaluated(mark).last().map(|evaluated| evaluated.delivery), Some(Delivery::Complete));
     assert_eq!(world.left_op(mark), []);
     assert!(world.saw(mark, |event| *event == Event::Returned { subdevice: SubDeviceId(2) }));
-    let status = world.judged(mark).last().expect("cycles went by").status;
+    let status = world.evaluated(mark).last().expect("cycles went by").status;
     assert_eq!((status.wkc, status.expected), (2, 2));
 }
 
@@ -206,9 +206,9 @@ fn a_domain_without_a_response_from_the_start_is_reported_once() {
         world.saw(mark, |event| matches!(event, Event::StateReached { subdevice: SubDeviceId(0), .. })),
         "it does not know of it"
     );
-    let told = world.events(mark).iter().filter_map(|timed| match timed.event {
+    let reports = world.events(mark).iter().filter_map(|timed| match timed.event {
         Event::Domain { domain, status, .. } => Some((domain, status.state, status.wkc, status.returned)),
         _ => None,
     });
-    assert_eq!(told.collect::<Vec<_>>(), [(DomainId(0), DomainState::Zero, 0, true)]);
+    assert_eq!(reports.collect::<Vec<_>>(), [(DomainId(0), DomainState::Zero, 0, true)]);
 }

@@ -198,7 +198,7 @@ impl Run {
         };
         let mut world = World::with(seed, network, &options, declare).unwrap_or_else(|it| panic!("seed {seed}: {it}"));
         // Latched outputs are checked elsewhere; here the logs and the stamps are used.
-        world.judge_latched(false);
+        world.evaluate_latched(false);
         world.settle();
         Run {
             world,
@@ -225,13 +225,13 @@ impl Run {
         });
         for (domain, status) in domains.into_iter().zip(statuses) {
             if let Some(status) = status.filter(|status| !status.pending) {
-                self.judge(domain, status.state);
+                self.evaluate(domain, status.state);
             }
         }
     }
 
     /// Checks all inputs of a domain after a cycle in which it was due.
-    fn judge(&mut self, domain: DomainId, state: DomainState) {
+    fn evaluate(&mut self, domain: DomainId, state: DomainState) {
         let application = self.world.application();
         let exchange = application.exchange();
         let image = exchange.image(domain).to_vec();
@@ -332,8 +332,8 @@ impl Run {
         });
         let domains = self.images.len();
         self.world.until(Duration::from_secs(30), "all back", |world| {
-            let judged = world.judged(world.beginning());
-            let last = |domain: usize| judged.iter().rev().find(|it| it.domain == DomainId(domain));
+            let evaluated = world.evaluated(world.beginning());
+            let last = |domain: usize| evaluated.iter().rev().find(|it| it.domain == DomainId(domain));
             let is_complete = |domain| last(domain).is_some_and(|it| it.delivery == Delivery::Complete);
             world.all_in_op() && (0..domains).all(is_complete)
         });
@@ -341,8 +341,8 @@ impl Run {
         self.all_to_op = true;
         let mark = self.world.mark();
         self.cycles(40);
-        for judged in self.world.judged(mark) {
-            assert!(judged.status.state == DomainState::Complete && judged.stale.is_empty(), "{judged:?}");
+        for evaluated in self.world.evaluated(mark) {
+            assert!(evaluated.status.state == DomainState::Complete && evaluated.stale.is_empty(), "{evaluated:?}");
         }
     }
 }

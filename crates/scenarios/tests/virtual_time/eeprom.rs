@@ -27,7 +27,7 @@ fn world(target: AlState, prepare: impl FnOnce(&mut ringcat_sim::network::Networ
         declaration
     })
     .expect("scan and activation");
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     world
 }
 

@@ -1,5 +1,5 @@
 //! An application ends while the redundant link is down on purpose, or while broken rings are examined: what is out of
-//! reach on purpose comes back. Judged by carriers and loop settings inside the simulated segment (protocol 2.2, 9.5).
+//! reach on purpose comes back. Checked by carriers and loop settings inside the simulated segment (protocol 2.2, 9.5).
 
 use std::time::Duration;
 

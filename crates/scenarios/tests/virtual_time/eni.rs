@@ -366,13 +366,15 @@ fn a_network_that_differs_from_the_file_is_reported_per_subdevice() {
     let network = Network::from_description(other).expect("cables fit");
     let mut main_device = MainDevice::request(SimulatedSegment::new(network), &Options::default());
     let found = main_device.scan().expect("a scan").subdevices;
-    let told: Vec<String> = file.compare(&found).iter().map(ToString::to_string).collect();
-    assert_eq!(told.len(), 2, "{told:?}");
+    let reports: Vec<String> = file.compare(&found).iter().map(ToString::to_string).collect();
+    assert_eq!(reports.len(), 2, "{reports:?}");
     assert!(
-        told[0].contains("\"Lamps (1002)\"") && told[0].contains("expected product code 0x00000002, got 0x00004711")
+        reports[0].contains("\"Lamps (1002)\"")
+            && reports[0].contains("expected product code 0x00000002, got 0x00004711")
     );
     assert!(
-        told[1].contains("\"Buttons (1004)\"") && told[1].contains("expected vendor id 0x00000c47, got 0x00000bec")
+        reports[1].contains("\"Buttons (1004)\"")
+            && reports[1].contains("expected vendor id 0x00000c47, got 0x00000bec")
     );
     assert!(
         file.compare(&found[..4])

@@ -216,13 +216,13 @@ fn addresses_and_filter_are_set_and_read_beside_frames() {
         .with_dns(Ipv4Addr::new(9, 9, 9, 9))
         .with_name(b"drive".to_vec());
     let (own, sent) = (mailbox.clone(), settings.clone());
-    let told = world.run(async move {
+    let reports = world.run(async move {
         eoe::set_ip(&own, 0, &sent, LIMITS).await?;
         eoe::read_ip(&own, 0, LIMITS).await
     });
-    let told = told.expect("it has an IP stack");
-    assert_eq!((told.gateway, told.dns, &told.name), (settings.gateway, settings.dns, &settings.name));
-    assert_eq!(told.address, Some(Ipv4Addr::new(10, 0, 0, 2)), "what was not set stays");
+    let reports = reports.expect("it has an IP stack");
+    assert_eq!((reports.gateway, reports.dns, &reports.name), (settings.gateway, settings.dns, &settings.name));
+    assert_eq!(reports.address, Some(Ipv4Addr::new(10, 0, 0, 2)), "what was not set stays");
     let filter = AddressFilter::new(&[[2, 0, 0, 0, 0, 1]], &[], true).expect("one address");
     let own = mailbox.clone();
     let back = world.run(async move {
@@ -277,8 +277,8 @@ fn declared_addresses_are_set_at_each_start_and_refusals_reported() {
     for _ in 0..2 {
         world.settle();
         let own = world.mailbox(TERMINAL);
-        let told = world.run(async move { eoe::read_ip(&own, 0, LIMITS).await }).expect("it has an IP stack");
-        assert_eq!((told.address, &told.name), (settings.address, &settings.name));
+        let reports = world.run(async move { eoe::read_ip(&own, 0, LIMITS).await }).expect("it has an IP stack");
+        assert_eq!((reports.address, &reports.name), (settings.address, &settings.name));
         // It loses them without power.
         world.power_off(DeviceIndex(TERMINAL));
         world.run_cycles(20);
@@ -288,11 +288,11 @@ fn declared_addresses_are_set_at_each_start_and_refusals_reported() {
     let mut world = start(&multicast, TERMINAL).expect("it can be activated");
     let mark = world.mark();
     world.run_cycles(200);
-    let told = |event: &Event| {
+    let reports = |event: &Event| {
         matches!(event, Event::ConfigurationFailed { subdevice: SubDeviceId(TERMINAL), reason }
         if reason.contains("EoE port 0: the SubDevice refused"))
     };
-    assert!(world.saw(mark, told), "{:?}", world.events(mark));
+    assert!(world.saw(mark, reports), "{:?}", world.events(mark));
     let without = start(&settings, 1).expect_err("a terminal without a mailbox");
     assert!(without.to_string().contains("IP parameters are to be set, but the SubDevice has no EoE"), "{without}");
 }

@@ -141,7 +141,7 @@ fn run(seed: u64) {
     })
     .unwrap_or_else(|error| panic!("seed {seed}: {error}"));
     // Late and duplicated frames change the devices.
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     let (cables, devices) = (world.network().cables().len(), world.network().devices().len());
     let mut broken = Broken::default();
     for _ in 0..10 + dice.below(40) {
@@ -151,7 +151,7 @@ fn run(seed: u64) {
     }
     mend(&mut world, broken);
     world.until(RECOVERY, "all back", |world| {
-        let complete = world.judged(world.beginning()).last().is_some_and(|j| j.delivery == Delivery::Complete);
+        let complete = world.evaluated(world.beginning()).last().is_some_and(|j| j.delivery == Delivery::Complete);
         let ring = if closed { world.application().ring() == RingState::Closed } else { true };
         world.all_in_op() && world.application().all_settled() && complete && ring
     });
@@ -161,7 +161,7 @@ fn run(seed: u64) {
     // Long delayed frames are still outstanding.
     world.run_cycles(500);
     let mark = world.mark();
-    world.judge_latched(true);
+    world.evaluate_latched(true);
     world.run_cycles(100);
     assert_eq!((world.incomplete(mark), world.left_op(mark)), (0, Vec::new()));
     assert_eq!(troubles(world.events(mark)), Vec::<&Event>::new());

@@ -52,7 +52,7 @@ fn after_an_application_stall_all_subdevices_return_to_op() {
             };
             assert!(world.saw(mark, fell), "{subdevice} is named with its code");
         }
-        assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete));
+        assert_eq!(world.evaluated(mark).last().map(|evaluated| evaluated.delivery), Some(Delivery::Complete));
         assert_eq!(ring_events(world.events(mark)), Vec::<&Event>::new());
     }
 }
@@ -70,15 +70,15 @@ fn every_watchdog_expiry_is_reported_once() {
             world.run_cycles(1_100);
             let mut fell: Vec<usize> = world.left_op(mark).iter().map(|device| device.0).collect();
             fell.sort_unstable();
-            let told = troubles(world.events(mark)).into_iter().map(|event| match event {
+            let reports = troubles(world.events(mark)).into_iter().map(|event| match event {
                 Event::StateError { subdevice, requested: None, code: AlStatusCode::SYNC_MANAGER_WATCHDOG, .. } => {
                     subdevice.0
                 }
                 other => panic!("{other:?}"),
             });
-            let mut told: Vec<usize> = told.collect();
-            told.sort_unstable();
-            assert_eq!(told, fell, "round {round}");
+            let mut reports: Vec<usize> = reports.collect();
+            reports.sort_unstable();
+            assert_eq!(reports, fell, "round {round}");
             assert!(!fell.is_empty());
         }
     }
@@ -162,7 +162,7 @@ fn a_subdevice_that_refuses_for_long_does_not_delay_others() {
     // The pause between attempts grows, which limits the number of events.
     let errors = troubles(world.events(world.beginning())).len();
     assert!((3..12).contains(&errors), "{errors} events");
-    let last = world.judged(world.beginning()).last().expect("cycles went by");
+    let last = world.evaluated(world.beginning()).last().expect("cycles went by");
     assert_eq!((last.delivery, last.stale.as_slice()), (Delivery::WithoutAbsent, [3].as_slice()));
 }
 
@@ -190,11 +190,11 @@ fn a_wrong_sii_checksum_is_reported_and_does_not_affect_others() {
     let mut world = World::with(6, network, &Options::default(), impatient).expect("activation");
     world.run_cycles(200);
     let start = world.beginning();
-    let told = |event: &Event| {
+    let reports = |event: &Event| {
         matches!(event, Event::SiiOddity { position, what }
         if position.0 == 2 && what.contains("checksum: expected"))
     };
-    assert!(world.saw(start, told));
+    assert!(world.saw(start, reports));
     // The controller does not load such an EEPROM, and without it the application does not run (protocol 4.7).
     let named = |event: &Event| {
         matches!(event, Event::ConfigurationFailed { subdevice: SubDeviceId(2), reason }
@@ -264,7 +264,7 @@ fn a_whole_segment_that_loses_power_recovers_automatically() {
         }
         world.until(LIMIT, "all in OP", all_well);
         world.run_cycles(20);
-        let last = world.judged(world.beginning()).last().map(|judged| judged.delivery);
+        let last = world.evaluated(world.beginning()).last().map(|evaluated| evaluated.delivery);
         assert_eq!(last, Some(Delivery::Complete));
         assert!(!world.saw(world.beginning(), |event| matches!(event, Event::Unexpected { .. })));
     }
@@ -293,9 +293,9 @@ fn a_subdevice_in_op_without_fmmus_is_detected_and_reconfigured() {
     world.network_mut().send(HostLink::Main, &frame);
     world.run_cycles(20);
     assert!(world.all_in_op());
-    assert!(world.judged(mark).last().expect("cycles went by").delivery.is_incomplete());
+    assert!(world.evaluated(mark).last().expect("cycles went by").delivery.is_incomplete());
     world.run_cycles(1_200);
-    assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete));
+    assert_eq!(world.evaluated(mark).last().map(|evaluated| evaluated.delivery), Some(Delivery::Complete));
     let named = |event: &Event| match event {
         Event::ConfigurationFailed { subdevice: SubDeviceId(1), reason } => reason.contains("FMMU"),
         _ => false,

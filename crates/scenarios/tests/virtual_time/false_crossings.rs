@@ -88,7 +88,7 @@ fn run(seed: u64, course: Course) -> Vec<String> {
     let declare = |scan: &Scan| automatic(&scan.subdevices, CYCLE).with_sends_again(seeds::sends_again(seed));
     let mut world = World::with(seed, network, &options, declare).expect("activation");
     // Lost copies change the devices; freshness is checked in other scenarios.
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     if course == Course::Scan {
         world.run_cycles(80);
     } else {
@@ -123,23 +123,23 @@ const COURSES: [Course; 4] = [Course::InOp, Course::Enhanced, Course::Scan, Cour
 // covers: LC-01, crossed-lines
 #[test]
 fn short_cuts_under_frame_loss_report_no_crossed_line() {
-    let told: Vec<String> = (0..150).flat_map(|seed| run(seed, Course::InOp)).collect();
-    assert_eq!(told, Vec::<String>::new());
+    let reports: Vec<String> = (0..150).flat_map(|seed| run(seed, Course::InOp)).collect();
+    assert_eq!(reports, Vec::<String>::new());
 }
 
 // covers: LC-03, crossed-lines
 #[test]
 fn short_cuts_with_enhanced_detection_and_at_the_scan_cross_no_line() {
     let both = |seed| [Course::Enhanced, Course::Scan].into_iter().flat_map(move |course| run(seed, course));
-    let told: Vec<String> = (0..75).flat_map(both).collect();
-    assert_eq!(told, Vec::<String>::new());
+    let reports: Vec<String> = (0..75).flat_map(both).collect();
+    assert_eq!(reports, Vec::<String>::new());
 }
 
 // covers: LC-01, crossed-lines
 #[test]
 fn a_crossed_line_is_reported_in_spite_of_cuts_and_loss() {
-    let told: Vec<String> = (0..75).flat_map(|seed| run(seed, Course::Crossed)).collect();
-    assert_eq!(told, Vec::<String>::new());
+    let reports: Vec<String> = (0..75).flat_map(|seed| run(seed, Course::Crossed)).collect();
+    assert_eq!(reports, Vec::<String>::new());
 }
 
 #[test]

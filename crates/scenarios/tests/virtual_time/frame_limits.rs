@@ -37,7 +37,7 @@ fn limited(count: usize, is_ring: bool, datagrams: u16, beyond: Beyond) -> Netwo
     segment(count, is_ring, Some(DatagramLimit { datagrams, beyond }))
 }
 
-fn told(datagrams: u16) -> Options {
+fn limited_to(datagrams: u16) -> Options {
     Options::default().with_max_datagrams_per_frame(datagrams)
 }
 
@@ -83,7 +83,7 @@ fn a_ring_check_that_exceeds_the_datagram_limit_reports_it() {
         };
         let error = look(&Options::default()).expect_err("more than 15 in a frame").to_string();
         assert!(error.contains("set max_datagrams_per_frame to 15"), "{error}");
-        let counts = look(&told(15)).expect("it is whole").counts;
+        let counts = look(&limited_to(15)).expect("it is whole").counts;
         assert_eq!((counts.main, counts.redundant), (12, 0));
     }
 }
@@ -92,10 +92,10 @@ fn a_ring_check_that_exceeds_the_datagram_limit_reports_it() {
 #[test]
 fn a_limit_that_was_set_too_high_is_reported() {
     for beyond in BOTH {
-        let error = scan(limited(40, false, 15, beyond), &told(16)).expect_err("one too many");
+        let error = scan(limited(40, false, 15, beyond), &limited_to(16)).expect_err("one too many");
         assert!(error.to_string().contains("set max_datagrams_per_frame to 15"), "{error}");
     }
-    let error = scan(limited(40, true, 2, Beyond::Dropped), &told(3)).expect_err("never enough");
+    let error = scan(limited(40, true, 2, Beyond::Dropped), &limited_to(3)).expect_err("never enough");
     assert!(error.to_string().contains("RingCAT needs 3"), "{error}");
 }
 
@@ -108,7 +108,7 @@ fn with_the_limit_set_no_frame_exceeds_it_and_all_else_is_unchanged() {
                 let what = format!("{count}, ring {is_ring}, {datagrams} {beyond:?}");
                 let network = limited(count, is_ring, datagrams, beyond);
                 let declare = |scan: &Scan| automatic(&scan.subdevices, CYCLE);
-                let mut world = World::with(1, network, &told(datagrams), declare).expect("it fits");
+                let mut world = World::with(1, network, &limited_to(datagrams), declare).expect("it fits");
                 world.settle();
                 let mark = world.mark();
                 world.run_cycles(50);
@@ -123,8 +123,8 @@ fn with_the_limit_set_no_frame_exceeds_it_and_all_else_is_unchanged() {
                     world.heal(CableId(count / 2));
                 }
                 world.until(LIMIT, "all back", |world| {
-                    let last = world.judged(world.beginning()).last();
-                    world.all_in_op() && last.is_some_and(|judged| judged.delivery == Delivery::Complete)
+                    let last = world.evaluated(world.beginning()).last();
+                    world.all_in_op() && last.is_some_and(|evaluated| evaluated.delivery == Delivery::Complete)
                 });
                 assert_eq!(too_many(&world), 0, "{what}");
                 assert!(!world.saw(world.beginning(), |event| matches!(event, Event::FrameLimit { .. })), "{what}");
@@ -147,7 +147,7 @@ fn cyclic_frames_with_a_datagram_per_subdevice_keep_the_limit() {
     for datagrams in [3, 4, 15] {
         for is_ring in [false, true] {
             let network = limited(24, is_ring, datagrams, Beyond::Dropped);
-            let mut world = World::with(2, network, &told(datagrams), busy).expect("it fits");
+            let mut world = World::with(2, network, &limited_to(datagrams), busy).expect("it fits");
             world.settle();
             world.run_cycles(20);
             assert!(world.all_in_op() && too_many(&world) == 0, "{datagrams}, ring {is_ring}");
@@ -226,7 +226,7 @@ fn random_frame_losses_are_not_mistaken_for_a_limit() {
 #[test]
 fn a_ring_closes_again_with_a_limit_that_drops() {
     let declare = |scan: &Scan| automatic(&scan.subdevices, CYCLE);
-    let mut world = World::with(4, limited(30, true, 15, Beyond::Dropped), &told(15), declare).expect("it fits");
+    let mut world = World::with(4, limited(30, true, 15, Beyond::Dropped), &limited_to(15), declare).expect("it fits");
     world.settle();
     for cable in 0..=30 {
         world.cut(CableId(cable));

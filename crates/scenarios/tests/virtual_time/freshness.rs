@@ -125,7 +125,10 @@ fn a_slow_transition_to_safeop_leaves_inputs_of_others_fresh() {
             let mark = world.mark();
             let request = world.application_mut().engine_mut().start_state_request(SubDeviceId(subdevice), AlState::Op);
             world.finish(Duration::from_secs(5), request).expect("it comes back");
-            let stale = world.judged(mark).iter().flat_map(|judged| judged.stale.iter().filter(|it| **it != subdevice));
+            let stale = world
+                .evaluated(mark)
+                .iter()
+                .flat_map(|evaluated| evaluated.stale.iter().filter(|it| **it != subdevice));
             assert_eq!(stale.count(), 0, "ring: {closed}, {kind} comes back");
             assert_eq!(world.incomplete(mark), 0, "ring: {closed}, {kind} comes back");
             world.settle();
@@ -212,7 +215,7 @@ fn a_domain_is_incomplete_while_outputs_are_not_accepted() {
             let mut described = descriptions(kinds);
             described[0].controller_fmmus = fmmus;
             let mut world = World::in_op(1, line(described, NetworkOptions::default()));
-            world.judge_latched(false);
+            world.evaluate_latched(false);
             world.run_cycles(20);
             let write =
                 world.application_mut().engine_mut().start_register_write(SubDeviceId(0), map::fmmu(0), vec![0; 16]);
@@ -221,7 +224,7 @@ fn a_domain_is_incomplete_while_outputs_are_not_accepted() {
             let mark = world.mark();
             world.run_cycles(60);
             let wrong = world
-                .judged(mark)
+                .evaluated(mark)
                 .iter()
                 .filter(|it| it.status.state == DomainState::Complete && it.status.wkc < it.status.expected);
             assert_eq!(wrong.count(), 0, "{kinds:?}, FMMUs: {fmmus:?}");
@@ -239,19 +242,19 @@ fn outputs_of_a_starting_subdevice_do_not_replace_those_of_a_lost_one() {
         it.transitions = TransitionTimes::all(Duration::from_millis(100));
     }
     let mut world = World::in_op(1, line(described, NetworkOptions::default()));
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     let request = world.application_mut().engine_mut().start_state_request(SubDeviceId(0), AlState::Init);
     world.finish(Duration::from_secs(5), request).expect("it goes there");
     world.run_cycles(50);
     drop(world.application_mut().engine_mut().start_state_request(SubDeviceId(0), AlState::Op));
     world.until(Duration::from_secs(1), "it takes outputs", |world| {
-        world.judged(world.beginning()).last().is_some_and(|it| it.status.wkc == 2)
+        world.evaluated(world.beginning()).last().is_some_and(|it| it.status.wkc == 2)
     });
     world.power_off(DeviceIndex(1));
     world.run_cycles(2);
     let mark = world.mark();
     world.run_cycles(300);
-    let complete = world.judged(mark).iter().filter(|it| it.status.state == DomainState::Complete);
+    let complete = world.evaluated(mark).iter().filter(|it| it.status.state == DomainState::Complete);
     assert_eq!(complete.count(), 0);
 }
 
@@ -386,7 +389,7 @@ fn run(seed: u64) -> Tally {
     let mut world =
         World::with(seed, network, &junctions(), declare).unwrap_or_else(|error| panic!("seed {seed}: {error}"));
     // Latched outputs are checked elsewhere; here only the logs are used.
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     if under_way == 1 {
         world.compare_tries();
     }
@@ -406,7 +409,7 @@ fn run(seed: u64) -> Tally {
     run.world.application_mut().links_mut().lose_per_mille(0, seed);
     run.mend();
     run.world.until(Duration::from_secs(25), "all back", |world| {
-        let last = world.judged(world.beginning()).last().map(|judged| judged.delivery);
+        let last = world.evaluated(world.beginning()).last().map(|evaluated| evaluated.delivery);
         world.all_in_op() && last == Some(Delivery::Complete)
     });
     run.world.run_cycles(20);

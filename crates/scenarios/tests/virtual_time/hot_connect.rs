@@ -80,7 +80,7 @@ fn until_joined(world: &mut World) {
         let device = world.device_of(subdevice).expect("it is there");
         assert_eq!(world.network().device(device).al_status(), AlStatus::new(AlState::Op));
     }
-    let last = world.judged(world.beginning()).last().expect("cycles went by");
+    let last = world.evaluated(world.beginning()).last().expect("cycles went by");
     assert_eq!((last.status.wkc, last.stale.clone()), (last.status.expected, Vec::new()));
 }
 
@@ -91,7 +91,7 @@ fn until_left(world: &mut World) {
 
 /// Cycles in which a domain was incomplete: the group is optional.
 fn errors(world: &World, since: Mark) -> usize {
-    world.judged(since).iter().filter(|judged| judged.status.state != DomainState::Complete).count()
+    world.evaluated(since).iter().filter(|evaluated| evaluated.status.state != DomainState::Complete).count()
 }
 
 fn count(world: &World, since: Mark, wanted: &Event) -> usize {
@@ -158,8 +158,8 @@ fn an_unplugged_group_with_its_own_domain_does_not_affect_others() {
         world.run_cycles(20);
         world.fault_in(BETWEEN, Fault::Cut(cable));
         until_left(&mut world);
-        let all = world.judged(mark).iter().filter(|judged| judged.status.state != DomainState::Complete);
-        let (others, own): (Vec<_>, Vec<_>) = all.partition(|judged| judged.domain == DomainId(0));
+        let all = world.evaluated(mark).iter().filter(|evaluated| evaluated.status.state != DomainState::Complete);
+        let (others, own): (Vec<_>, Vec<_>) = all.partition(|evaluated| evaluated.domain == DomainId(0));
         println!("round {round}: {} cycles of the others, {} of the group's own domain", others.len(), own.len());
         assert_eq!(others.len(), 0);
     }
@@ -267,9 +267,9 @@ fn a_broken_group_is_reported_and_its_remaining_part_is_used() {
     let mut world = world(line(all, NetworkOptions::default()));
     let state = world.application().groups()[0];
     assert_eq!((state.present, state.settled, state.members), (1, 1, 2));
-    let told =
+    let reports =
         |event: &Event| matches!(event, Event::Mismatch { subdevice: SubDeviceId(5), position, .. } if position.0 == 5);
-    assert!(world.saw(world.beginning(), told));
+    assert!(world.saw(world.beginning(), reports));
     world.run_cycles(200);
     assert_eq!(world.network().device(DeviceIndex(5)).al_status(), AlStatus::new(AlState::Init), "it is left alone");
 }
@@ -351,7 +351,7 @@ fn run(seed: u64) -> u64 {
     let (network, cables) = random_network(&mut dice);
     let declare = |scan: &Scan| declare(scan).with_sends_again(seeds::sends_again(seed));
     let mut world = World::with(seed, network, &Options::default(), declare).expect("scan and activation");
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     world.compare_tries();
     world.until(LIMIT, "all settled", |world| world.application().all_settled());
     let lost = *dice.pick(&[0, 0, 10, 50]);
@@ -387,13 +387,17 @@ fn run(seed: u64) -> u64 {
     (0..cables).for_each(|cable| world.heal(CableId(cable)));
     (0..BASE.len() + GROUP.len()).for_each(|device| world.power_on(DeviceIndex(device)));
     world.until(Duration::from_secs(20), "all back", |world| {
-        let last = world.judged(world.beginning()).last().map(|judged| judged.delivery);
+        let last = world.evaluated(world.beginning()).last().map(|evaluated| evaluated.delivery);
         world.all_in_op() && has_joined(world) && last == Some(Delivery::Complete)
     });
     world.run_cycles(20);
     let mark = world.mark();
     world.run_cycles(40);
-    assert!(world.judged(mark).iter().all(|judged| judged.stale.is_empty()), "{:?}", world.judged(mark).last());
+    assert!(
+        world.evaluated(mark).iter().all(|evaluated| evaluated.stale.is_empty()),
+        "{:?}",
+        world.evaluated(mark).last()
+    );
     world.proven()
 }
 

@@ -166,13 +166,13 @@ fn a_held_address_is_reported_once_and_checked_at_growing_intervals() {
     assert!(acyclic < 1_000, "{acyclic} frames in 10 s beside those of process data");
     assert_ne!(application.exchange().freshness(DOMAIN, SubDeviceId(1)), Freshness::Fresh);
     let events: Vec<Event> = core::iter::from_fn(|| application.pop_event()).map(|timed| timed.event).collect();
-    let told = |event: &&Event| match event {
+    let reports = |event: &&Event| match event {
         Event::ConfigurationFailed { subdevice: SubDeviceId(1), reason } => {
             reason.contains("does not give up the address")
         }
         _ => false,
     };
-    assert_eq!(events.iter().filter(told).count(), 1, "{events:?}");
+    assert_eq!(events.iter().filter(reports).count(), 1, "{events:?}");
     assert_eq!(events.iter().find(|event| matches!(event, Event::Returned { subdevice: SubDeviceId(1) })), None);
     let network = application.links_mut().network_mut();
     network.cut(CableId(2));
@@ -213,7 +213,7 @@ fn identical_subdevices_return_to_their_places_in_any_order() {
             let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices, CYCLE);
             let mut world = World::with(7, network, &options, declare).expect("it fits");
             world.settle();
-            world.judge_latched(false);
+            world.evaluate_latched(false);
             let home: Vec<u16> = (0..4).map(|device| world.station_of(device)).collect();
             let what = format!("{} cables, {kind}, {last} comes last", cables.len());
             (1..4).for_each(|device| world.power_off(DeviceIndex(device)));

@@ -90,7 +90,7 @@ fn with_image(mut description: DeviceDescription, image: &[u8]) -> DeviceDescrip
 }
 
 /// Checks that hold in every case, and the result for this SubDevice.
-fn judge(made: &Variant, odd: DeviceDescription) -> Result<(Outcome, bool), String> {
+fn evaluate(made: &Variant, odd: DeviceDescription) -> Result<(Outcome, bool), String> {
     let network = line(around(odd), NetworkOptions::default());
     let started = World::with(1, network, &Options::default(), |scan| automatic(&scan.subdevices, CYCLE));
     let mut world = started.map_err(|error| format!("the activation fails: {error}"))?;
@@ -104,7 +104,7 @@ fn judge(made: &Variant, odd: DeviceDescription) -> Result<(Outcome, bool), Stri
         world.events(world.beginning()).iter().find_map(|timed| own(&timed.event))
     };
     let all_complete = |world: &World| {
-        let last = world.judged(world.beginning()).last();
+        let last = world.evaluated(world.beginning()).last();
         world.application().all_settled()
             && world.all_in_op()
             && last.is_some_and(|last| last.delivery == Delivery::Complete && last.status.wkc == last.status.expected)
@@ -118,7 +118,7 @@ fn judge(made: &Variant, odd: DeviceDescription) -> Result<(Outcome, bool), Stri
         }
         if world.application().now() >= begin + LIMIT {
             let states: Vec<_> = world.network().devices().map(|device| device.al_status().al_state()).collect();
-            let status = world.judged(world.beginning()).last().map(|judged| judged.status);
+            let status = world.evaluated(world.beginning()).last().map(|evaluated| evaluated.status);
             return Err(format!("neither in OP nor a reason: {states:?} {status:?}"));
         }
         world.run_cycles(10);
@@ -128,7 +128,7 @@ fn judge(made: &Variant, odd: DeviceDescription) -> Result<(Outcome, bool), Stri
     let latched: Vec<u64> = world.network().devices().map(|device| device.outputs_latched()).collect();
     world.run_cycles(50);
     others_work(&world, &latched)?;
-    if world.judged(mark).iter().any(|judged| judged.delivery.is_incomplete()) {
+    if world.evaluated(mark).iter().any(|evaluated| evaluated.delivery.is_incomplete()) {
         return Err(format!("{outcome:?}, and cycles are incomplete"));
     }
     if outcome == Outcome::Complete && !all_complete(&world) {
@@ -170,7 +170,7 @@ fn others_work(world: &World, latched: &[u64]) -> Result<(), String> {
 }
 
 /// Checks all variants of an image, of seed 1 or of those in the environment.
-fn judge_all(sound: &DeviceDescription, count: u64, tally: &mut Tally) {
+fn evaluate_all(sound: &DeviceDescription, count: u64, tally: &mut Tally) {
     for seed in seeds::from_environment().unwrap_or(1..2) {
         judge_seed(sound, seed, count, tally);
     }
@@ -196,9 +196,9 @@ fn judge_seed(sound: &DeviceDescription, seed: u64, count: u64, tally: &mut Tall
                     }
                 },
             };
-            let judged = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| judge(&made, odd)));
-            let judged = judged.unwrap_or_else(|_| Err("it panics, or image and SubDevice differ".to_owned()));
-            match judged {
+            let evaluated = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| evaluate(&made, odd)));
+            let evaluated = evaluated.unwrap_or_else(|_| Err("it panics, or image and SubDevice differ".to_owned()));
+            match evaluated {
                 Ok((outcome, warned)) => {
                     tally.warned += usize::from(warned);
                     match outcome {
@@ -239,7 +239,7 @@ fn finish(tally: &Tally, what: &str) {
 fn damaged_catalogue_images_are_explained_and_stop_no_other_subdevice() {
     let mut tally = Tally::default();
     for name in catalogue::names() {
-        judge_all(&describe(name, name), variants(SOME), &mut tally);
+        evaluate_all(&describe(name, name), variants(SOME), &mut tally);
     }
     finish(&tally, "images of the catalogue");
 }
@@ -262,12 +262,12 @@ fn damaged_images_of_real_devices_stop_no_other_subdevice() {
         match DeviceDescription::from_sii(image.clone(), &name) {
             Ok(mut sound) => {
                 sound.behaviour = Behaviour::Terminal(InputSource::Outputs);
-                judge_all(&sound, variants(MANY), &mut tally);
+                evaluate_all(&sound, variants(MANY), &mut tally);
             }
             Err(error) => {
                 println!("{name}: {error}");
                 let plain = DeviceDescription::plain(&name, Identity::default());
-                judge_all(&with_image(plain, &image), variants(MANY), &mut tally);
+                evaluate_all(&with_image(plain, &image), variants(MANY), &mut tally);
             }
         }
     }

@@ -60,7 +60,7 @@ fn in_op(seed: u64, network: Network, setting: Setting<'_>) -> World {
 }
 
 /// Events about local rings since a point.
-fn told(world: &World, mark: Mark) -> Vec<Event> {
+fn reports(world: &World, mark: Mark) -> Vec<Event> {
     let events = world.events(mark).iter().map(|timed| timed.event.clone());
     let of_junctions = |event: &Event| matches!(event, Event::JunctionChanged { .. } | Event::JunctionsBlocked { .. });
     events.filter(of_junctions).map(without_names).collect()
@@ -95,7 +95,7 @@ fn edge(world: &mut World, what: &str, act: impl FnOnce(&mut World)) -> Mark {
     assert_eq!(world.left_op(mark), [], "{what}");
     assert_eq!(troubles(world.events(mark)), Vec::<&Event>::new(), "{what}");
     assert!(world.incomplete(mark) <= 1, "{what}: {} cycles", world.incomplete(mark));
-    assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete), "{what}");
+    assert_eq!(world.evaluated(mark).last().map(|evaluated| evaluated.delivery), Some(Delivery::Complete), "{what}");
     mark
 }
 
@@ -104,7 +104,7 @@ fn edge(world: &mut World, what: &str, act: impl FnOnce(&mut World)) -> Mark {
 fn each_cable_of_a_ring_behind_a_junction_is_cut_and_repaired_in_op() {
     for setting in [(JunctionMode::Automatic, &[][..]), (JunctionMode::Strict, &[STRICT])] {
         let mut world = in_op(1, one_ring(), setting);
-        assert_eq!(told(&world, world.beginning()), [], "it is whole");
+        assert_eq!(reports(&world, world.beginning()), [], "it is whole");
         for cable in RING {
             for phase in [0, 40, 500] {
                 let what = format!("{setting:?}, cable {cable}, phase {phase}");
@@ -112,12 +112,12 @@ fn each_cable_of_a_ring_behind_a_junction_is_cut_and_repaired_in_op() {
                     world.fault_in(CYCLE * phase / 1000, ringcat_sim::fault::Fault::Cut(CableId(cable)))
                 };
                 let mark = edge(&mut world, &what, cut);
-                assert_eq!(told(&world, mark), [changed(cable, true)], "{what}");
+                assert_eq!(reports(&world, mark), [changed(cable, true)], "{what}");
                 let heal = |world: &mut World| {
                     world.fault_in(CYCLE * phase / 1000, ringcat_sim::fault::Fault::Heal(CableId(cable)))
                 };
                 let mark = edge(&mut world, &what, heal);
-                assert_eq!(told(&world, mark), [changed(cable, false)], "{what}");
+                assert_eq!(reports(&world, mark), [changed(cable, false)], "{what}");
             }
         }
         assert_eq!(crossed(&world, world.beginning()), 0, "LC-06");
@@ -135,23 +135,23 @@ fn a_ring_behind_a_junction_broken_from_the_start_is_reported() {
             let mut world = in_op(2, network, setting);
             world.run_cycles(100);
             let what = format!("{setting:?}, cable {cable}");
-            let told_then = told(&world, world.beginning());
+            let reported_then = reports(&world, world.beginning());
             assert_eq!(troubles(world.events(world.beginning())), Vec::<&Event>::new(), "{what}");
             assert_eq!(crossed(&world, world.beginning()), 0, "{what}");
             if cable == 5 && setting.0 == JunctionMode::Automatic {
-                assert_eq!(told_then, [], "nothing shows that there could be a ring");
+                assert_eq!(reported_then, [], "nothing shows that there could be a ring");
                 continue;
             }
             let (near, far) = ends(cable);
             // The SubDevice before the break is not known yet, but the closing cable was declared.
             let near = (cable == 5).then_some(near);
-            assert_eq!(told_then, [change(near, far, true, 1)], "{what}");
+            assert_eq!(reported_then, [change(near, far, true, 1)], "{what}");
             let mark = edge(&mut world, &what, |world| world.heal(CableId(cable)));
-            assert_eq!(told(&world, mark), [change(near, far, false, 0)], "{what}");
+            assert_eq!(reports(&world, mark), [change(near, far, false, 0)], "{what}");
             // Afterwards the whole ring is known.
             for cable in RING {
                 let mark = edge(&mut world, &what, |world| world.cut(CableId(cable)));
-                assert_eq!(told(&world, mark), [changed(cable, true)], "{what}");
+                assert_eq!(reports(&world, mark), [changed(cable, true)], "{what}");
                 edge(&mut world, &what, |world| world.heal(CableId(cable)));
             }
         }
@@ -185,9 +185,13 @@ fn a_ring_closed_after_the_scan_is_reported_unknown_unless_declared() {
         // Its breaks cost as much as those of a known ring, and are reported as in JR-04, or by their place.
         let mark = edge(&mut world, &what, |world| world.cut(CableId(3)));
         let is_known = setting.0 == JunctionMode::Strict;
-        assert_eq!((told(&world, mark).len(), crossed(&world, mark)), if is_known { (1, 0) } else { (0, 1) }, "{what}");
+        assert_eq!(
+            (reports(&world, mark).len(), crossed(&world, mark)),
+            if is_known { (1, 0) } else { (0, 1) },
+            "{what}"
+        );
         let mark = edge(&mut world, &what, |world| world.heal(CableId(3)));
-        assert_eq!(unknown(&world, mark), [], "{what}: it was told");
+        assert_eq!(unknown(&world, mark), [], "{what}: it was reported");
     }
 }
 
@@ -197,9 +201,9 @@ fn a_declared_connection_enables_junction_redundancy_disabled_by_default() {
     assert_eq!(Options::default().junctions, JunctionMode::Disabled);
     let mut world = in_op(11, one_ring(), (JunctionMode::Disabled, &[STRICT]));
     let mark = edge(&mut world, "cut", |world| world.cut(CableId(3)));
-    assert_eq!((told(&world, mark), crossed(&world, mark)), (vec![changed(3, true)], 0));
+    assert_eq!((reports(&world, mark), crossed(&world, mark)), (vec![changed(3, true)], 0));
     let mark = edge(&mut world, "heal", |world| world.heal(CableId(3)));
-    assert_eq!((told(&world, mark), crossed(&world, mark)), (vec![changed(3, false)], 0));
+    assert_eq!((reports(&world, mark), crossed(&world, mark)), (vec![changed(3, false)], 0));
 }
 
 // covers: junctions
@@ -214,8 +218,8 @@ fn a_ring_behind_a_junction_that_breaks_during_start_up_comes_to_op() {
             );
             let mut world = in_op(at_us, network, (JunctionMode::Strict, &[STRICT]));
             world.run_cycles(50);
-            let told = told(&world, world.beginning());
-            assert_eq!(told.len(), 1, "cut at {at_us} us: {told:?}");
+            let reports = reports(&world, world.beginning());
+            assert_eq!(reports.len(), 1, "cut at {at_us} us: {reports:?}");
             let lost = world.saw(world.beginning(), |event| matches!(event, Event::Lost { .. }));
             assert!(!lost, "cut at {at_us} us, cable {cable}");
         }
@@ -228,7 +232,7 @@ fn a_cut_of_the_line_loses_subdevices_without_a_ring_event() {
     let mark = world.mark();
     world.cut(CableId(6));
     world.run_cycles(200);
-    assert_eq!(told(&world, mark), []);
+    assert_eq!(reports(&world, mark), []);
     for subdevice in 0..7 {
         assert_eq!(
             world.saw(mark, |event| *event == Event::Lost { subdevice: SubDeviceId(subdevice) }),
@@ -247,7 +251,7 @@ fn without_junction_redundancy_a_broken_local_ring_is_a_crossed_line() {
         let mut world = in_op(7, one_ring(), (JunctionMode::Disabled, &[]));
         assert_eq!(crossed(&world, world.beginning()), 0);
         let mark = edge(&mut world, "cut", |world| world.cut(CableId(cable)));
-        assert_eq!(told(&world, mark), []);
+        assert_eq!(reports(&world, mark), []);
         let reversed = |event: &Event| {
             matches!(event, Event::LineCrossed { position: Some(at), entry_port: Some(1) }
             if usize::from(at.0) == cable)
@@ -325,7 +329,7 @@ fn random_segments_with_a_local_ring_work_alike_with_one_break() {
         for cable in (0..cables).filter(|cable| ring.contains(cable)) {
             let what = format!("seed {seed}, cable {cable}");
             let mark = edge(&mut world, &what, |world| world.cut(CableId(cable)));
-            assert_eq!(told(&world, mark).len(), 1, "{what}");
+            assert_eq!(reports(&world, mark).len(), 1, "{what}");
             edge(&mut world, &what, |world| world.heal(CableId(cable)));
         }
         assert!(world.compared() > before);
@@ -355,7 +359,7 @@ fn transfers_continue_through_cuts_and_repairs_of_a_local_ring() {
         }
         world.run_cycles(100);
         assert_eq!(world.left_op(mark), []);
-        assert_eq!(told(&world, mark).len(), 2, "{cable:?}");
+        assert_eq!(reports(&world, mark).len(), 2, "{cable:?}");
     }
 }
 
@@ -381,7 +385,7 @@ fn a_repair_right_after_a_break_is_reported_despite_other_port_reads() {
             world.fault_in(Duration::from_micros(after_us), ringcat_sim::fault::Fault::Heal(CableId(cable)));
             world.run_cycles(120);
             let what = format!("after {after_us} us, clocks: {with_clocks}");
-            assert_eq!(told(&world, mark), [changed(cable, true), changed(cable, false)], "{what}");
+            assert_eq!(reports(&world, mark), [changed(cable, true), changed(cable, false)], "{what}");
         }
     }
 }

@@ -22,7 +22,7 @@ fn world() -> World {
     let mut described = descriptions(&["emulated-output-8", "servo"]);
     described[0].sync_managers[0].enable = SiiSyncManager::ENABLE | SiiSyncManager::OP_ONLY;
     let mut world = World::in_op(1, line(described, NetworkOptions::default()));
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     world
 }
 
@@ -72,16 +72,16 @@ fn a_configuration_overwritten_by_a_late_write_is_restored() {
         world.finish(Duration::from_secs(1), write).expect("it is there");
         world.until(HEALED, &what, |world| held(world) == before && world.application().all_settled());
         // Some SubDevices detect it themselves.
-        let told = |event: &Event| match event {
+        let reports = |event: &Event| match event {
             Event::ConfigurationFailed { subdevice: of, reason } => {
                 *of == SubDeviceId(subdevice) && reason.contains("0x0")
             }
             Event::StateError { subdevice: of, .. } => *of == SubDeviceId(subdevice),
             _ => false,
         };
-        assert!(world.saw(mark, told), "{what}: {:?}", world.events(mark));
+        assert!(world.saw(mark, reports), "{what}: {:?}", world.events(mark));
         world.run_cycles(3_000);
-        let count = world.events(mark).iter().filter(|timed| told(&timed.event)).count();
+        let count = world.events(mark).iter().filter(|timed| reports(&timed.event)).count();
         assert_eq!(count, 1, "{what}: it is configured once");
     }
 }

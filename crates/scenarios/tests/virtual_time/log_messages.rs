@@ -1,4 +1,4 @@
-//! Messages of levels 1 and 2, set while the MainDevice runs, with a mask of subjects; judged by the frames on the
+//! Messages of levels 1 and 2, set while the MainDevice runs, with a mask of subjects; evaluated by the frames on the
 //! links.
 
 use std::time::Duration;

@@ -43,14 +43,14 @@ fn declared(network: Network, clocks: bool) -> World {
     };
     let mut world = World::with(7, network, &Options::default(), declare).expect("it fits");
     // Inputs of a drive that reaches OP change while frames are under way.
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     world.settle();
-    world.judge_latched(true);
+    world.evaluate_latched(true);
     world
 }
 
 fn is_complete(world: &World) -> bool {
-    world.judged(world.beginning()).last().is_some_and(|judged| judged.delivery == Delivery::Complete)
+    world.evaluated(world.beginning()).last().is_some_and(|evaluated| evaluated.delivery == Delivery::Complete)
 }
 
 // covers: large-segments
@@ -92,8 +92,8 @@ fn breaks_at_both_sides_of_position_255_keep_all_inputs_and_have_their_places() 
             assert!(is_complete(&world), "{what}");
             let links = world.application().ring_status().links;
             assert_eq!(links.map(|link| usize::from(link.answering)), [cable, count - cable], "{what}");
-            let told = ring_events(world.events(mark));
-            let place = told.iter().find_map(|event| match event {
+            let reports = ring_events(world.events(mark));
+            let place = reports.iter().find_map(|event| match event {
                 Event::BreakLocated { cable } => Some(*cable),
                 _ => None,
             });

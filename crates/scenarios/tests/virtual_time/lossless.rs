@@ -12,7 +12,7 @@ use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::address::LogicalAddress;
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
-use scenarios::check::Judged;
+use scenarios::check::Evaluated;
 use scenarios::one_buffer::{self, one_buffer};
 use scenarios::segments::{descriptions, line, ring};
 use scenarios::world::World;
@@ -59,7 +59,7 @@ struct Row {
 fn edges(count: usize, detection: Duration, cycle: Duration, cables: &[usize], phases: u32) -> Row {
     let network = ring(descriptions(&kinds(count)), NetworkOptions::default().with_detection_delay(detection));
     let mut world = world(network, |scan| automatic(&scan.subdevices, cycle));
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     world.compare_tries();
     world.application_mut().links_mut().measure_flights();
     world.run_cycles(10);
@@ -149,7 +149,7 @@ fn a_full_acyclic_half_leaves_the_time_of_a_second_try_free() {
     for (count, cycle) in [(4, CYCLES[0]), (10, CYCLES[1]), (33, CYCLES[1]), (10, CYCLES[2])] {
         let network = ring(descriptions(&kinds(count)), NetworkOptions::default().with_detection_delay(detection));
         let mut world = world(network, |scan| automatic(&scan.subdevices, cycle));
-        world.judge_latched(false);
+        world.evaluate_latched(false);
         world.compare_tries();
         let mut load = FullLoad { waiting: Vec::new() };
         (0..LEARNING).for_each(|_| load.cycle(&mut world));
@@ -189,7 +189,7 @@ fn single_lost_frames_cost_no_cycle() {
             let options = NetworkOptions::default();
             let network = if in_ring { ring(network(), options) } else { line(network(), options) };
             let mut world = world(network, |scan| automatic(&scan.subdevices, MS));
-            world.judge_latched(false);
+            world.evaluate_latched(false);
             world.compare_tries();
             let mark = world.mark();
             world.application_mut().links_mut().lose_one_in(one_in, 7);
@@ -234,7 +234,7 @@ fn outputs_of_sm_synchronous_subdevices_are_taken_once_in_a_cycle() {
         declaration.subdevices[3].repetition = Repetition::Everything;
         declaration
     });
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     world.compare_tries();
     for cable in 1..=kinds.len() {
         let (before, mark) = (latched(&world), world.mark());
@@ -247,10 +247,10 @@ fn outputs_of_sm_synchronous_subdevices_are_taken_once_in_a_cycle() {
         let times = |device: usize| if device < cable { 4 } else { 3 };
         assert_eq!((taken[0], taken[3], taken[4]), (times(0), times(3), times(4)), "cable {cable}");
         assert_eq!(taken[1], if 1 < cable { 3 } else { 2 }, "cable {cable}: once in each cycle at most");
-        assert!(world.judged(mark).iter().all(|judged| judged.stale.is_empty()), "inputs are read again");
+        assert!(world.evaluated(mark).iter().all(|evaluated| evaluated.stale.is_empty()), "inputs are read again");
         // No copy shows that the servo took the outputs of that cycle.
-        let whole = |judged: &&Judged| judged.status.state == DomainState::Complete;
-        let missed = world.judged(mark).iter().filter(|judged| !whole(judged)).count();
+        let whole = |evaluated: &&Evaluated| evaluated.status.state == DomainState::Complete;
+        let missed = world.evaluated(mark).iter().filter(|evaluated| !whole(evaluated)).count();
         assert_eq!(missed, 1, "cable {cable}");
     }
 }
@@ -272,7 +272,7 @@ fn process_data_of_one_buffer_subdevices_is_transferred_once_in_a_cycle() {
             let mark = world.mark();
             world.run_cycles(100);
             assert_eq!(world.incomplete(mark), 0, "buffers are emptied and filled in each cycle");
-            world.judge_latched(false);
+            world.evaluate_latched(false);
             for cable in 1..kinds.len() {
                 for direction in Direction::ALL {
                     let (before, spared) = (latched(&world), world.spared());
@@ -311,7 +311,7 @@ fn outputs_of_subdevices_with_sync_signals_are_not_repeated_across_sync0() {
             }
             declaration
         });
-        world.judge_latched(false);
+        world.evaluate_latched(false);
         let before = world.application().cyclic_counters();
         world.fault(Fault::Drop { cable: CableId(1), direction: Some(Direction::AToB), count: 1 });
         world.run_cycles(10);

@@ -78,9 +78,9 @@ fn concerns(trouble: Trouble, kind: Kind) -> bool {
     }
 }
 
-/// A request; returns the asker again.
-fn question(world: &mut World, mut asker: Requester, number: u32) -> (Result<(), String>, Requester) {
-    world.run(async move { (asker.ask(number).await, asker) })
+/// A request; returns the requester again.
+fn question(world: &mut World, mut requester: Requester, number: u32) -> (Result<(), String>, Requester) {
+    world.run(async move { (requester.ask(number).await, requester) })
 }
 
 // covers: 6.1, mailbox-faults
@@ -91,10 +91,10 @@ fn every_protocol_recovers_from_every_fault_of_mail_and_frames() {
         let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10));
         let mut world = World::in_op(1, ring(descriptions(&PLANT), options));
         let (mailbox, station) = (world.mailbox(ALL), world.station_of(ALL));
-        let mut asker = Requester::new(kind, mailbox.clone(), LIMITS, false);
+        let mut requester = Requester::new(kind, mailbox.clone(), LIMITS, false);
         let mut number = 1;
         let mut result;
-        (result, asker) = question(&mut world, asker, number);
+        (result, requester) = question(&mut world, requester, number);
         assert_eq!(result, Ok(()), "{kind:?}");
         for (trouble, outcome) in troubles().into_iter().filter(|(trouble, _)| concerns(*trouble, kind)) {
             world.say(format!("{kind:?}: {trouble:?}"));
@@ -107,15 +107,15 @@ fn every_protocol_recovers_from_every_fault_of_mail_and_frames() {
                 }
             }
             number += 1;
-            (result, asker) = question(&mut world, asker, number);
-            let told = result.err().unwrap_or_default();
+            (result, requester) = question(&mut world, requester, number);
+            let reports = result.err().unwrap_or_default();
             match (outcome, trouble) {
-                (Outcome::Answer, _) => assert_eq!(told, "", "{kind:?}, {trouble:?}"),
+                (Outcome::Answer, _) => assert_eq!(reports, "", "{kind:?}, {trouble:?}"),
                 // The first fragment is discarded, the second one is an invalid request.
                 (Outcome::Error(_), Trouble::Mail(MailFault::LoseRequests { .. })) if kind == Kind::IdnList => {
-                    assert!(told.contains("refused by the drive"), "{told}");
+                    assert!(reports.contains("refused by the drive"), "{reports}");
                 }
-                (Outcome::Error(words), _) => assert!(told.contains(words), "{kind:?}, {trouble:?}: {told}"),
+                (Outcome::Error(words), _) => assert!(reports.contains(words), "{kind:?}, {trouble:?}: {reports}"),
             }
             // A second copy of the last response is found by the poll for unsolicited mail.
             world.run_cycles(10);
@@ -132,7 +132,7 @@ fn every_protocol_recovers_from_every_fault_of_mail_and_frames() {
             }
             world.fault(Fault::Mail(DeviceIndex(ALL), MailFault::Heal));
             number += 1;
-            (result, asker) = question(&mut world, asker, number);
+            (result, requester) = question(&mut world, requester, number);
             assert_eq!(result, Ok(()), "{kind:?}, after {trouble:?}");
             seen += 1;
         }

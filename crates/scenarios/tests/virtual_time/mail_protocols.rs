@@ -281,14 +281,14 @@ fn emergencies_are_events_and_kept_with_the_mailbox() {
         world.run_cycles(10);
     }
     world.finish(Duration::from_secs(5), reading);
-    let told = world.events(mark).iter().filter_map(|timed| match timed.event {
+    let reports = world.events(mark).iter().filter_map(|timed| match timed.event {
         ringcat::Event::Emergency { subdevice: ringcat::Address::Declared(SubDeviceId(ALL)), emergency } => {
             Some(emergency.error_code)
         }
         _ => None,
     });
-    let told: Vec<u16> = told.collect();
-    assert_eq!(told, (1..=10).collect::<Vec<_>>());
+    let reports: Vec<u16> = reports.collect();
+    assert_eq!(reports, (1..=10).collect::<Vec<_>>());
     let kept: Vec<_> = std::iter::from_fn(|| mailbox.pop_emergency()).map(|received| received.emergency).collect();
     assert_eq!(kept, (1..=10).map(emergency).collect::<Vec<_>>());
     assert_eq!(mailbox.emergencies().overruns(), 0);

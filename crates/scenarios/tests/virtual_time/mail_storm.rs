@@ -147,14 +147,14 @@ fn is_injected_abort(result: &Result<(), ConfigureError>) -> bool {
 fn start(world: &mut World, device: usize, at: usize, stop: &Rc<Cell<bool>>, tally: &Rc<Tally>) -> Pending<()> {
     let mailbox = world.mailbox(device);
     let bus = mailbox.bus().clone();
-    let mut asker = Requester::new(KINDS[at], mailbox, LIMITS, true);
+    let mut requester = Requester::new(KINDS[at], mailbox, LIMITS, true);
     let (stop, tally) = (stop.clone(), tally.clone());
     world.start(async move {
         // Numbers differ between devices, kinds and requests.
         let mut number = (device * 16 + at) as u32;
         while !stop.get() {
             number += 64;
-            let count = if asker.ask(number).await.is_ok() { &tally.answered } else { &tally.failed };
+            let count = if requester.ask(number).await.is_ok() { &tally.answered } else { &tally.failed };
             count.set(count.get() + 1);
             bus.sleep(Duration::from_micros(300)).await;
         }
@@ -194,7 +194,7 @@ fn run(seed: u64, tally: &Rc<Tally>) {
     plant[ALL[0]].services.eoe.address = Some(DEVICE.into());
     plant[ALL[0]].services.eoe.mask = Some([255, 255, 255, 0].into());
     let mut world = World::in_op(seed, ring(plant, options));
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     let before = quiet_moment(&mut world);
     let stop = Rc::new(Cell::new(false));
     let mut works = Vec::new();
@@ -259,8 +259,8 @@ fn all_answer(world: &mut World, seed: u64) {
         if (device, kind) == (ALL[0], Kind::Address) {
             continue;
         }
-        let mut asker = Requester::new(kind, world.mailbox(device), ringcat::Limits::new(END, END), true);
-        let result = world.run(async move { asker.ask(0xFFFF).await });
+        let mut requester = Requester::new(kind, world.mailbox(device), ringcat::Limits::new(END, END), true);
+        let result = world.run(async move { requester.ask(0xFFFF).await });
         assert_eq!(result, Ok(()), "seed {seed}, device {device}, {kind:?}");
     }
 }

@@ -130,7 +130,7 @@ fn a_network_file_of_100_subdevices_takes_less_than_2_s_beyond_the_scan() {
     assert_eq!(network.file.to_text(), text);
 }
 
-/// Judged by the outputs of the simulated terminals.
+/// Evaluated by the outputs of the simulated terminals.
 // covers: network-file, sim-files
 #[test]
 fn a_simulated_segment_of_a_network_file_reaches_op_with_the_file() {

@@ -45,7 +45,7 @@ fn odd(world: &World) -> &SubDeviceInfo {
     &world.scan.subdevices[ODD]
 }
 
-fn told(world: &World, text: &str) -> bool {
+fn reports(world: &World, text: &str) -> bool {
     world.saw(world.beginning(), |event| {
         matches!(event, Event::SiiOddity { position, what } if usize::from(position.0) == ODD && what.contains(text))
     })
@@ -62,7 +62,7 @@ fn pdos_that_the_sii_leaves_out_are_read_from_the_dictionary() {
     assert_eq!(pdos, [(0x1600, Some(2)), (0x1A00, Some(3))]);
     assert!(read.application().entry(SubDeviceId(ODD), 0x6041, 0).is_some(), "entries have names by index");
     assert_eq!(troubles(read.events(read.beginning())), Vec::<&Event>::new());
-    assert!(!told(&read, "dictionary"), "missing data is not a contradiction");
+    assert!(!reports(&read, "dictionary"), "missing data is not a contradiction");
     read.power_off(DeviceIndex(ODD));
     read.run_cycles(20);
     read.power_on(DeviceIndex(ODD));
@@ -85,7 +85,7 @@ fn the_dictionary_has_priority_over_the_sii_which_is_reported() {
     let mut asked = world(devices(), ReadPdos::Always);
     asked.settle();
     asked.run_cycles(50);
-    assert!(told(&asked, "SM 3: 16 bits of process data in the SII, but 32 bits in other PDOs of the dictionary"));
+    assert!(reports(&asked, "SM 3: 16 bits of process data in the SII, but 32 bits in other PDOs of the dictionary"));
     let areas = asked.application().directory().areas(SubDeviceId(ODD));
     assert_eq!(areas.iter().map(|area| area.placed.area.length).collect::<Vec<_>>(), [4, 4]);
     let mut trusting = world(devices(), ReadPdos::Missing);
@@ -210,7 +210,7 @@ fn an_sii_without_an_end_marker_is_reported_and_used() {
     devices[ODD].sii_image = Some(image);
     let mut world = world(devices, ReadPdos::Missing);
     world.settle();
-    assert!(told(&world, "no end marker"), "{:?}", world.events(world.beginning()));
+    assert!(reports(&world, "no end marker"), "{:?}", world.events(world.beginning()));
 }
 
 // covers: odd-sii
@@ -224,7 +224,7 @@ fn a_blank_eeprom_is_reported_and_the_others_reach_op() {
         devices[ODD].identity.serial = u32::from_le_bytes([blank; 4]);
         let mut world = world(devices, ReadPdos::Always);
         world.run_cycles(300);
-        assert!(told(&world, "the EEPROM is blank"));
+        assert!(reports(&world, "the EEPROM is blank"));
         let others = world.network().devices().enumerate().filter(|(number, _)| *number != ODD);
         assert!(others.into_iter().all(|(_, device)| device.al_status() == AlStatus::new(AlState::Op)));
     }
@@ -244,8 +244,8 @@ fn others_run_and_it_says(mut world: World, reason: &str) {
     assert!(world.compared() > compared && world.incomplete(mark) == 0);
     let others = world.network().devices().enumerate().filter(|(number, _)| *number != ODD);
     assert!(others.into_iter().all(|(_, device)| device.al_status() == AlStatus::new(AlState::Op)));
-    let told = world.events(mark).iter().filter(|timed| matches!(timed.event, Event::ConfigurationFailed { .. }));
-    assert_eq!(told.count(), 0, "it is told once");
+    let reports = world.events(mark).iter().filter(|timed| matches!(timed.event, Event::ConfigurationFailed { .. }));
+    assert_eq!(reports.count(), 0, "it is reported once");
 }
 
 // covers: odd-sii
@@ -258,7 +258,7 @@ fn an_invalid_sii_stops_only_its_own_subdevice() {
     image[14] ^= 0xFF;
     devices[ODD].sii_image = Some(image);
     let mut garbage = world(devices, ReadPdos::Missing);
-    assert!(told(&garbage, "byte 0x0030: mailboxes of 10616 bytes at 0x7878 and 12876 bytes at 0x4521 are ignored"));
+    assert!(reports(&garbage, "byte 0x0030: mailboxes of 10616 bytes at 0x7878 and 12876 bytes at 0x4521 are ignored"));
     garbage.run_cycles(100);
     // Process data where there is no memory.
     let mut devices = descriptions(&KINDS);
@@ -308,8 +308,8 @@ fn an_sii_repaired_in_operation_is_reported_without_a_place() {
         matches!(event, Event::PlanOddity { subdevice: SubDeviceId(ODD), what }
             if what.contains("it has no place in the process image before the next activation, and stays in SAFEOP"))
     };
-    let told = world.events(mark).iter().filter(|timed| says(&timed.event));
-    assert_eq!(told.count(), 1, "{:?}", world.events(mark));
+    let reports = world.events(mark).iter().filter(|timed| says(&timed.event));
+    assert_eq!(reports.count(), 1, "{:?}", world.events(mark));
     assert_eq!(world.application().directory().areas(SubDeviceId(ODD)).len(), 0);
     let (mark, compared) = (world.mark(), world.compared());
     world.run_cycles(3_000);
@@ -335,7 +335,7 @@ fn a_damaged_sii_without_declared_parts_keeps_its_places_and_blocks_no_other() {
         declaration
     });
     let mut world = started.expect("one bad EEPROM stops no other SubDevice");
-    assert!(told(&world, "no category follows the fixed area: the image is truncated"));
+    assert!(reports(&world, "no category follows the fixed area: the image is truncated"));
     assert!(world.application().entry(SubDeviceId(ODD), 0x7000, 1).is_some());
     world.run_cycles(300);
     let others = world.network().devices().enumerate().filter(|(number, _)| *number != ODD);
@@ -413,7 +413,7 @@ fn sync_managers_without_a_type_are_read_alike_everywhere() {
             let world = in_op_as_it_says(&described, &format!("{kind}, without PDOs: {without_pdos}"));
             let found: Vec<_> = odd(&world).sync_managers.iter().map(|manager| manager.kind).collect();
             assert_eq!(found, kinds, "{kind}");
-            assert!(told(&world, "has type 0, assumed to be for"));
+            assert!(reports(&world, "has type 0, assumed to be for"));
         }
     }
 }
@@ -435,7 +435,7 @@ fn in_op_as_it_says(described: &DeviceDescription, what: &str) -> World {
         let mut world = world(devices.clone(), pdos);
         world.run_cycles(300);
         assert_eq!(troubles(world.events(world.beginning())), Vec::<&Event>::new(), "{what}");
-        let last = world.judged(world.beginning()).last().expect("cycles went by").status;
+        let last = world.evaluated(world.beginning()).last().expect("cycles went by").status;
         assert!(world.all_in_op() && last.wkc == last.expected, "{what}: {last:?}");
         world
     });
@@ -463,7 +463,7 @@ fn a_dictionary_that_does_not_respond_delays_only_its_subdevice() {
     network.apply(ringcat_sim::fault::Fault::Hang(DeviceIndex(ODD), true));
     let options = Options::default();
     let world = World::with(1, network, &options, |scan| automatic(&scan.subdevices, CYCLE)).expect("scan");
-    assert!(told(&world, "the PDOs in its dictionary cannot be read"));
+    assert!(reports(&world, "the PDOs in its dictionary cannot be read"));
     let seconds = Duration::from_nanos(world.now().0).as_secs();
     assert!(seconds < 10, "{seconds} s");
     assert_eq!(world.application().entry(SubDeviceId(ODD), 0x6041, 0), None);

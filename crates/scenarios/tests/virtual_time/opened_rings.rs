@@ -1,5 +1,5 @@
 //! Rings and branches that the MainDevice opens at a port: the application closes another port meanwhile, or ends.
-//! Judged by the loop settings inside the SubDevices (protocol 2.2, 7.1).
+//! Evaluated by the loop settings inside the SubDevices (protocol 2.2, 7.1).
 
 use std::time::Duration;
 

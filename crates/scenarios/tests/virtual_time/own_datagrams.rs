@@ -106,7 +106,7 @@ fn application_positions_are_those_of_a_rescan_that_updated_the_cabling() {
     };
     let mut world = World::with(6, movable(), &Options::default(), declare).expect("scan and activation");
     world.settle();
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     let are = |world: &mut World, devices: &[usize], what: &str| {
         // Not before the second junction: a crossed SubDevice is the one unconnected port 0 that a frame may pass.
         for broken in [None, Some(CableId(3)), Some(CableId(4))] {

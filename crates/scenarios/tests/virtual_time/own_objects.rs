@@ -159,7 +159,7 @@ fn objects_show_declared_and_found_subdevices_and_their_states() {
 #[test]
 fn objects_follow_a_break_damaged_frames_and_a_loss_until_reset() {
     let mut world = world();
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     world.corrupt(CableId(2), 20);
     world.run_cycles(40);
     assert!(number(&mut world, 0xA002, 10) > 0, "at the port that sees them first");
@@ -193,7 +193,7 @@ fn objects_follow_a_break_damaged_frames_and_a_loss_until_reset() {
 #[test]
 fn faults_of_a_subdevice_are_counted_and_kept_in_the_history() {
     let mut world = world();
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     let seen = |world: &mut World| [14, 17, 18, 19].map(|sub_index| number(world, 0xA002, sub_index));
     let mailbox = world.mailbox(2);
     let limits = Limits::new(LIMIT, LIMIT);
@@ -247,7 +247,7 @@ fn detection_scans_the_segment_and_long_lists_are_segmented() {
     // So many that their addresses need two lists.
     let inputs = descriptions(&["digital-input-8"; COUNT]);
     let mut world = World::in_op(2, ring(inputs, NetworkOptions::default()));
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     let stations: Vec<u8> = (0..255_u16).flat_map(|at| (0x1001 + at).to_le_bytes()).collect();
     assert_eq!(read(&mut world, 0xF020, 1, true), Ok(stations.clone()));
     assert_eq!(number(&mut world, 0xF021, 0), 5);

@@ -281,7 +281,7 @@ impl Parts {
         self.check_tries();
         self.shown.processed += 1;
         if self.has_sent[domain] {
-            self.truth.judge(status, id, self.application.exchange(), self.application.links().network());
+            self.truth.evaluate(status, id, self.application.exchange(), self.application.links().network());
         }
         let known = self.known[domain];
         let has_data = status.expected > 0;

@@ -116,10 +116,10 @@ fn the_same_sync_manager_in_two_domains_delivers_to_both() {
         let mut world = World::with(5, network, &Options::default(), declare).expect("activation");
         world.settle();
         // A slow domain reads blocks while newer outputs have reached them.
-        world.judge_latched(false);
+        world.evaluate_latched(false);
         let mark = world.mark();
         world.run_cycles(400);
-        assert_eq!((world.incomplete(mark), world.judged(mark).len()), (0, 500));
+        assert_eq!((world.incomplete(mark), world.evaluated(mark).len()), (0, 500));
         let directory = world.application().directory();
         let block = directory.areas(SubDeviceId(0));
         let domains: Vec<_> = block.iter().map(|area| (area.placed.area.sync_manager, area.domain)).collect();
@@ -149,16 +149,18 @@ fn sixty_four_domains_of_one_subdevice_each_with_and_without_a_period() {
         let network = if is_ring { ring } else { line };
         let network = network(descriptions(&kinds), NetworkOptions::default());
         let mut world = World::with(6, network, &Options::default(), declare).expect("activation");
-        world.judge_latched(false);
+        world.evaluate_latched(false);
         world.until(Duration::from_secs(5), "everything settled", |world| world.application().all_settled());
         world.run_cycles(30);
         let mark = world.mark();
         world.run_cycles(60);
-        let late: Vec<_> = world.judged(mark).iter().filter(|judged| judged.delivery != Delivery::Complete).collect();
+        let late: Vec<_> =
+            world.evaluated(mark).iter().filter(|evaluated| evaluated.delivery != Delivery::Complete).collect();
         assert!(late.is_empty(), "{late:?}");
         for domain in 0..64 {
-            let judged = world.judged(mark).iter().filter(|judged| judged.domain == DomainId(domain)).count();
-            assert_eq!(judged, if domain % 3 == 2 { 20 } else { 60 }, "domain {domain}");
+            let evaluated =
+                world.evaluated(mark).iter().filter(|evaluated| evaluated.domain == DomainId(domain)).count();
+            assert_eq!(evaluated, if domain % 3 == 2 { 20 } else { 60 }, "domain {domain}");
         }
     }
 }
@@ -186,8 +188,8 @@ fn periods_that_are_no_multiples_of_each_other_keep_their_rates() {
     world.run_cycles(2_700);
     assert_eq!(world.incomplete(mark), 0);
     for (domain, expected) in [2_700, 1_800, 1_000, 2_700].into_iter().enumerate() {
-        let judged = world.judged(mark).iter().filter(|judged| judged.domain == DomainId(domain)).count();
-        assert!(judged.abs_diff(expected) <= 1, "domain {domain}: {judged} of {expected}");
+        let evaluated = world.evaluated(mark).iter().filter(|evaluated| evaluated.domain == DomainId(domain)).count();
+        assert!(evaluated.abs_diff(expected) <= 1, "domain {domain}: {evaluated} of {expected}");
     }
 }
 

@@ -70,7 +70,7 @@ fn power_cycle(world: &mut World, device: DeviceIndex, off: u64, phase: u32) -> 
 }
 
 fn last(world: &World, since: Mark) -> Option<Delivery> {
-    world.judged(since).last().map(|judged| judged.delivery)
+    world.evaluated(since).last().map(|evaluated| evaluated.delivery)
 }
 
 /// Lost once, returned once, nothing else.

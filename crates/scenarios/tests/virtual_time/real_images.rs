@@ -53,7 +53,7 @@ fn usable(descriptions: Vec<DeviceDescription>, refused: &mut Vec<String>) -> Ve
                 world.run_cycles(20);
                 assert!(world.all_in_op(), "{}", description.name);
                 assert_eq!(troubles(world.events(world.beginning())), Vec::<&Event>::new(), "{}", description.name);
-                let expected = world.judged(world.beginning()).last().map(|judged| judged.status.expected);
+                let expected = world.evaluated(world.beginning()).last().map(|evaluated| evaluated.status.expected);
                 println!("{}: in OP, working counter {}", description.name, expected.unwrap_or(0));
                 usable.push(description);
             }
@@ -69,8 +69,8 @@ fn exchange(mut world: World, what: &str) {
     world.run_cycles(200);
     assert!(world.all_in_op());
     assert_eq!(troubles(world.events(world.beginning())), Vec::<&Event>::new());
-    assert!(world.judged(mark).iter().all(|judged| judged.delivery == Delivery::Complete));
-    let status = world.judged(mark).last().expect("cycles went by").status;
+    assert!(world.evaluated(mark).iter().all(|evaluated| evaluated.delivery == Delivery::Complete));
+    let status = world.evaluated(mark).last().expect("cycles went by").status;
     assert_eq!(status.wkc, status.expected);
     println!(
         "{what}: {} SubDevices in OP, working counter {} of {}, {} bytes compared",

@@ -171,8 +171,8 @@ fn objects_are_read_and_compared_or_reported() {
         _ => None,
     });
     let source = StartupSource::Object { index: 0x2003, sub_index: 2 };
-    let told = (1, source, Some("a look".to_owned()), 50_000u32.to_le_bytes().to_vec());
-    assert_eq!(read.collect::<Vec<_>>(), [told]);
+    let reports = (1, source, Some("a look".to_owned()), 50_000u32.to_le_bytes().to_vec());
+    assert_eq!(read.collect::<Vec<_>>(), [reports]);
     let text = failure(self::world(&[upload(0x2001, 7, Some(&[8, 0]))]));
     assert_eq!(text, "start-up command 0 (PREOP to SAFEOP) \"a look\": SDO 0x2001:07: expected 08 00, got 07 00");
 }

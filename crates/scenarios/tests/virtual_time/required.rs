@@ -55,13 +55,13 @@ fn a_mismatch_is_reported_with_both_values_and_not_configured() {
         )
         .expect("activation");
         world.run_cycles(200);
-        let told = |event: &Event| match event {
+        let reports = |event: &Event| match event {
             Event::Mismatch { subdevice: SubDeviceId(2), position, field, expected, .. } => {
                 (position.0, *field, *expected) == (2, wanted, value)
             }
             _ => false,
         };
-        assert!(world.saw(world.beginning(), told), "{wanted}");
+        assert!(world.saw(world.beginning(), reports), "{wanted}");
         assert_eq!(states(&world), [op, op, AlStatus::new(AlState::Init), op], "{wanted}");
         assert_eq!(world.application().states()[2], SubDeviceState::Absent);
         assert!(!world.application().mandatory_settled());
@@ -147,7 +147,12 @@ fn a_missing_mandatory_subdevice_is_reported_and_may_join_later() {
     assert!(
         world.saw(world.beginning(), |event| *event == Event::Missing { subdevice: SubDeviceId(3), optional: false })
     );
-    assert!(world.judged(world.beginning()).iter().all(|judged| judged.status.state != ringcat::DomainState::Complete));
+    assert!(
+        world
+            .evaluated(world.beginning())
+            .iter()
+            .all(|evaluated| evaluated.status.state != ringcat::DomainState::Complete)
+    );
     world.power_on(DeviceIndex(3));
     world.settle();
     assert!(world.all_in_op());

@@ -65,7 +65,7 @@ fn a_rescan_finds_new_moved_and_missing_subdevices() {
     };
     let mut world = World::with(1, workshop(), &Options::default(), declare).expect("scan and activation");
     world.settle();
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     let calm = rescan(&mut world);
     assert_eq!(declared(&calm), (0..7).map(Some).collect::<Vec<_>>());
     assert_eq!((calm.moved().count(), calm.missing.len(), calm.topology.nodes.len()), (0, 0, 7));
@@ -97,8 +97,8 @@ fn a_rescan_finds_new_moved_and_missing_subdevices() {
     assert_eq!(moves, [(SubDeviceId(3), Position(3), Position(6))]);
     let last = moved.topology.nodes[6];
     assert_eq!((last.parent, last.entry_port), (Some((5, 1)), 1), "behind the new one, crossed");
-    let told = Event::Moved { subdevice: SubDeviceId(3), from: Position(3), to: Position(6) };
-    assert!(world.saw(mark, |event| *event == told));
+    let reports = Event::Moved { subdevice: SubDeviceId(3), from: Position(3), to: Position(6) };
+    assert!(world.saw(mark, |event| *event == reports));
 
     world.power_off(LEAVING);
     world.until(LIMIT, "gone", |world| world.application().states()[6] == SubDeviceState::Absent);
@@ -174,7 +174,7 @@ fn after_a_rescan_breaks_and_errors_use_the_new_cabling() {
     };
     let mut world = World::with(3, network, &Options::default(), declare).expect("scan and activation");
     world.settle();
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     let damage = |world: &mut World| {
         for _ in 0..3 {
             world.corrupt(BETWEEN, 1);
@@ -269,7 +269,7 @@ fn a_rescan_of_a_closed_ring_with_a_branch_on_port_2_gives_true_places() {
         };
         let mut world = World::with(4, network, &Options::default(), declare).expect("scan and activation");
         world.settle();
-        world.judge_latched(false);
+        world.evaluate_latched(false);
         open_at_scan.into_iter().for_each(|cable| world.heal(cable));
         world.run_cycles(60);
         let mark = world.mark();
@@ -282,8 +282,8 @@ fn a_rescan_of_a_closed_ring_with_a_branch_on_port_2_gives_true_places() {
             world.cut(between);
             world.run_cycles(100);
             assert_eq!(place(world), Some(at), "{open_at_scan:?}");
-            let told = |event: &Event| matches!(event, Event::BreakLocated { .. });
-            assert_eq!(world.events(mark).iter().filter(|timed| told(&timed.event)).count(), 1);
+            let reports = |event: &Event| matches!(event, Event::BreakLocated { .. });
+            assert_eq!(world.events(mark).iter().filter(|timed| reports(&timed.event)).count(), 1);
             world.heal(between);
             world.until(LIMIT, "closed", |world| world.application().ring_status().state == RingState::Closed);
             world.run_cycles(100);
@@ -324,9 +324,11 @@ fn an_unassigned_subdevice_becomes_a_member_at_its_rescan_place() {
     };
     let mut world = World::with(5, network, &Options::default(), declare).expect("scan and activation");
     world.settle();
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     world.power_on(SPARE);
-    world.until(LIMIT, "told", |world| world.saw(world.beginning(), |event| matches!(event, Event::Unexpected { .. })));
+    world.until(LIMIT, "reported", |world| {
+        world.saw(world.beginning(), |event| matches!(event, Event::Unexpected { .. }))
+    });
     assert_eq!(declared(&rescan(&mut world)), [Some(0), Some(1), None]);
     world.power_off(FIRST);
     world.until(LIMIT, "taken over", |world| {

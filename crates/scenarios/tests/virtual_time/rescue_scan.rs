@@ -1,4 +1,4 @@
-//! The rescue scan: a scan on request without an application disturbs no SubDevice that has stayed; judged by the
+//! The rescue scan: a scan on request without an application disturbs no SubDevice that has stayed; evaluated by the
 //! SubDevices and by the frames on the links.
 
 use std::time::Duration;

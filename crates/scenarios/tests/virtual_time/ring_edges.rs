@@ -37,8 +37,8 @@ fn cut_after(world: &mut World, moment: Duration) -> ([u64; 2], Delivery, Vec<us
     world.fault_in(moment, Fault::Cut(CableId(CUT)));
     world.cycle();
     let now = latched(world);
-    let judged = world.judged(mark).last().expect("a cycle is judged before the next one");
-    let result = ([now[0] - before[0], now[1] - before[1]], judged.delivery, judged.stale.clone());
+    let evaluated = world.evaluated(mark).last().expect("a cycle is evaluated before the next one");
+    let result = ([now[0] - before[0], now[1] - before[1]], evaluated.delivery, evaluated.stale.clone());
     world.run_cycles(4);
     world.heal(CableId(CUT));
     world.run_cycles(20);

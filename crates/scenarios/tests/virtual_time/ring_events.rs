@@ -65,7 +65,7 @@ fn each_edge_is_reported_in_its_cycle_and_located_within_five() {
             assert_eq!(ring_events(world.events(mark)), expected.iter().collect::<Vec<_>>(), "cable {cable}, {phase}");
             let shown = shown.expect("the ring is open");
             let at = |wanted: &Event| {
-                let event = world.events(mark).iter().find(|timed| timed.event == *wanted).expect("it was told");
+                let event = world.events(mark).iter().find(|timed| timed.event == *wanted).expect("it was reported");
                 event.at.since(shown)
             };
             slowest = slowest.max(at(&expected[0]));
@@ -154,11 +154,11 @@ fn redundancy_bus_faults_and_carriers_are_reported_separately() {
         world.run_cycles(50);
         world.heal(CableId(cable));
         world.run_cycles(50);
-        let told = others(world.events(mark));
+        let reports = others(world.events(mark));
         for event in [Event::LinkDown { link }, lost.clone(), Event::RedundancyRegained, Event::LinkUp { link }] {
-            assert_eq!(told.iter().filter(|told| **told == event).count(), 1, "{event:?} in {told:?}");
+            assert_eq!(reports.iter().filter(|reports| **reports == event).count(), 1, "{event:?} in {reports:?}");
         }
-        assert_eq!(told.len(), 4);
+        assert_eq!(reports.len(), 4);
     }
 }
 
@@ -234,16 +234,16 @@ fn a_cable_flapping_at_any_rate_changes_no_state_and_floods_no_log() {
         let lasts = if micros < 50 { half_period * 400 } else { lasts };
         flap(&mut world, number % 5, half_period, lasts);
         world.run_cycles(1_100);
-        let told = ring_events(world.events(mark)).len() + others(world.events(mark)).len();
-        let cycles = world.judged(mark).len();
-        println!("{micros:>14} | {:>8} of {cycles:>6} | {told}", world.incomplete(mark));
+        let reports = ring_events(world.events(mark)).len() + others(world.events(mark)).len();
+        let cycles = world.evaluated(mark).len();
+        println!("{micros:>14} | {:>8} of {cycles:>6} | {reports}", world.incomplete(mark));
         assert_eq!(world.left_op(mark), [], "{micros} us");
         assert!(!world.saw(mark, |event| matches!(event, Event::Lost { .. })), "{micros} us");
         let changes = (lasts.as_nanos() / half_period.as_nanos()) as usize + 1;
         // Ring, place, redundancy and carrier for each of 32 changes and four more a second, or of all if they are
         // fewer.
         let most = 4 * changes.min(32 + 4 * (lasts.as_millis() as usize / 1000 + 1)) + 2;
-        assert!(told <= most, "{micros} us: {told} of {most}");
+        assert!(reports <= most, "{micros} us: {reports} of {most}");
         assert_eq!(world.application().ring_status().redundancy, Redundancy::Ready);
         let closed = ring_events(world.events(mark)).last().is_none_or(|last| matches!(last, Event::RingClosed { .. }));
         assert!(closed, "the last report is the present state");
@@ -272,11 +272,11 @@ fn a_cable_flapping_in_one_direction_changes_no_state_and_floods_no_log() {
                 world.cycle();
             }
             world.run_cycles(1_200);
-            let told = ring_events(world.events(mark)).len() + others(world.events(mark)).len();
-            let (incomplete, cycles) = (world.incomplete(mark), world.judged(mark).len());
-            println!("{direction:?} {micros:>14} | {incomplete:>8} of {cycles:>6} | {told}");
+            let reports = ring_events(world.events(mark)).len() + others(world.events(mark)).len();
+            let (incomplete, cycles) = (world.incomplete(mark), world.evaluated(mark).len());
+            println!("{direction:?} {micros:>14} | {incomplete:>8} of {cycles:>6} | {reports}");
             assert_eq!(world.left_op(mark), [], "{direction:?}, {micros} us");
-            assert!(told <= 2 * changes as usize && told <= 80, "{direction:?}, {micros} us: {told}");
+            assert!(reports <= 2 * changes as usize && reports <= 80, "{direction:?}, {micros} us: {reports}");
             assert_eq!(world.application().ring_status().redundancy, Redundancy::Ready);
             if direction == Direction::BToA {
                 assert_eq!(incomplete, 0, "the copies of MAIN are enough");
@@ -295,8 +295,8 @@ fn an_unsteady_ring_is_reported_once_and_again_when_stable() {
         |world: &World| others(world.events(mark)).iter().filter(|e| matches!(e, Event::RingUnsteady { .. })).count();
     assert_eq!(unsteady(&world), 1);
     assert!(world.application().ring_status().unsteady && world.application().ring_status().changes > 100);
-    let told = ring_events(world.events(mark)).len();
-    assert!(told <= 80, "{told} events for {} changes", world.application().ring_status().changes);
+    let reports = ring_events(world.events(mark)).len();
+    assert!(reports <= 80, "{reports} events for {} changes", world.application().ring_status().changes);
     world.run_cycles(1_100);
     assert!(!world.application().ring_status().unsteady);
     assert!(matches!(ring_events(world.events(mark)).last(), Some(Event::RingClosed { main: 4, redundant: 0, .. })));

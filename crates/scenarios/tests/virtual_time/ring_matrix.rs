@@ -45,14 +45,14 @@ fn edge(world: &mut World, fault: Fault, phase: u32, detection: Duration) -> usi
     assert_eq!(world.left_op(mark), [], "no SubDevice leaves OP");
     assert!(world.all_in_op());
     assert_eq!(troubles(world.events(mark)), Vec::<&Event>::new(), "no SubDevice is in trouble");
-    let last = world.judged(mark).last().map(|judged| judged.delivery);
+    let last = world.evaluated(mark).last().map(|evaluated| evaluated.delivery);
     assert_eq!(last, Some(scenarios::check::Delivery::Complete), "complete again");
     world.incomplete(mark)
 }
 
 /// Time from a mark to an event behind it.
 fn delay(world: &World, mark: Mark, wanted: impl Fn(&Event) -> bool) -> Duration {
-    let begin = world.judged(mark).first().expect("a cycle went by").at;
+    let begin = world.evaluated(mark).first().expect("a cycle went by").at;
     let found = world.events(mark).iter().find(|timed| wanted(&timed.event)).expect("the event came");
     found.at.since(begin)
 }

@@ -138,7 +138,7 @@ fn a_subdevice_power_cycled_on_either_side_is_configured_again() {
         world
             .until(Duration::from_secs(5), "all in OP", |world| world.all_in_op() && world.application().all_settled());
         world.run_cycles(60);
-        assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete));
+        assert_eq!(world.evaluated(mark).last().map(|evaluated| evaluated.delivery), Some(Delivery::Complete));
         let left: Vec<usize> = world.left_op(mark).iter().map(|device| device.0).collect();
         assert!(left.iter().all(|device| gone.contains(device)), "{left:?} left OP with {device}");
         assert_eq!(world.application().ring_status().place, Some(cable_of_ring(8, 16)));
@@ -183,7 +183,11 @@ fn an_optional_subdevice_joins_on_either_side_of_a_break() {
         });
         world.recognise();
         world.run_cycles(50);
-        assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete), "cable {cable}");
+        assert_eq!(
+            world.evaluated(mark).last().map(|evaluated| evaluated.delivery),
+            Some(Delivery::Complete),
+            "cable {cable}"
+        );
         assert_eq!(world.left_op(mark), [], "cable {cable}");
         world.heal(CableId(cable));
         world.run_cycles(60);
@@ -256,10 +260,10 @@ fn one_lrw_per_subdevice_survives_any_break_and_counts_three_each() {
             world.fault_in(CYCLE / 20, fault);
             world.run_cycles(30);
             assert!(world.incomplete(mark) <= 1 && world.left_op(mark).is_empty(), "cable {cable}");
-            assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete));
+            assert_eq!(world.evaluated(mark).last().map(|evaluated| evaluated.delivery), Some(Delivery::Complete));
         }
     }
-    let status = world.judged(world.beginning()).last().expect("cycles went by").status;
+    let status = world.evaluated(world.beginning()).last().expect("cycles went by").status;
     // Input 1, all-protocols and servo 3 each with LRW, output 1.
     assert_eq!((status.wkc, status.expected), (8, 8));
     assert!(world.compared() > 0);
@@ -295,7 +299,7 @@ fn an_lrw_of_a_file_is_refused_on_two_links_and_one_per_subdevice_is_allowed() {
     let mut world =
         World::with(1, segment(), &Options::default(), declare(vec![named(&[1]), named(&[2])])).expect("allowed");
     world.settle();
-    let status = world.judged(world.beginning()).last().expect("cycles went by").status;
+    let status = world.evaluated(world.beginning()).last().expect("cycles went by").status;
     // As in the test above: LRW counts three each.
     assert_eq!((status.wkc, status.expected), (8, 8));
 }

@@ -299,7 +299,7 @@ fn call(engine: &mut Engine, function: Function) -> Answer {
 }
 
 /// The refusal is the one of the table, and names the function.
-fn judge(denied: Option<NotPermitted>, function: Function, role: MainDeviceRole, phase: MainDevicePhase) {
+fn evaluate(denied: Option<NotPermitted>, function: Function, role: MainDeviceRole, phase: MainDevicePhase) {
     assert_eq!(denied, function.check(role, phase).err(), "{function:?} in {role}, {phase:?}");
 }
 
@@ -318,7 +318,7 @@ fn each_function_is_refused_in_the_roles_and_phases_of_the_table_and_in_no_other
             assert_eq!(main_device.permission(function), function.permission(role, phase));
             let denied = Services::call(&mut main_device, move |engine| call(engine, function));
             let denied = denied.unwrap_or_else(|error| panic!("{function:?} in {phase:?}: {error}"));
-            judge(denied, function, role, phase);
+            evaluate(denied, function, role, phase);
             count += 1;
         }
         let mut application = application();
@@ -330,7 +330,7 @@ fn each_function_is_refused_in_the_roles_and_phases_of_the_table_and_in_no_other
         let pending = call(application.engine_mut(), function);
         let denied = application.cycle_until(pending, Duration::from_secs(5), |_| ());
         let denied = denied.unwrap_or_else(|error| panic!("{function:?} in {phase:?}: {error}"));
-        judge(denied, function, role, phase);
+        evaluate(denied, function, role, phase);
         count += 1;
     }
     assert_eq!(count, 6 * Function::ALL.len());
@@ -350,7 +350,7 @@ fn role_inactive_sends_nothing_for_a_call_and_all_work_again_when_it_is_active()
         Services::set_role(&mut main_device, MainDeviceRole::Inactive);
         frames.take();
         let denied = Services::call(&mut main_device, move |engine| call(engine, function)).expect("it is answered");
-        judge(denied, function, MainDeviceRole::Inactive, MainDevicePhase::Idle);
+        evaluate(denied, function, MainDeviceRole::Inactive, MainDevicePhase::Idle);
         main_device.attend(Duration::from_millis(20));
         let sent = frames.take().into_iter().filter(|passed| passed.is_sent).count();
         assert_eq!(sent, 0, "{function:?}");

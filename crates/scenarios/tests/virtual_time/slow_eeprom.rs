@@ -51,10 +51,10 @@ fn an_eeprom_that_is_always_slow_is_given_up_after_30_s_with_its_word() {
     slow.sii_image = Some(image);
     let mut main_device =
         MainDevice::request(Tap::new(network(vec![terminal(Duration::from_micros(500)), slow])), &Options::default());
-    let mut told = Vec::new();
+    let mut reports = Vec::new();
     let result = main_device.scan_with(|timed| {
         if let Event::SiiOddity { position, what } = &timed.event {
-            told.push((position.0, what.clone()));
+            reports.push((position.0, what.clone()));
         }
     });
     let took = Duration::from_nanos(main_device.links_mut().now().0);
@@ -62,7 +62,7 @@ fn an_eeprom_that_is_always_slow_is_given_up_after_30_s_with_its_word() {
     let found = result.expect("a scan").subdevices;
     assert!(found[0].warnings.is_empty() && found[0].name == "terminal" && !found[0].is_blank());
     assert!(found[1].is_blank() && found[1].identity.vendor_id == u32::MAX);
-    let (position, what) = &told[0];
+    let (position, what) = &reports[0];
     let word = what.strip_prefix("the EEPROM is slow: at word 0x").and_then(|rest| rest.strip_suffix(" after 30 s"));
     let word = word.and_then(|word| u32::from_str_radix(word, 16).ok()).unwrap_or_else(|| panic!("{what}"));
     assert_eq!(*position, 1);

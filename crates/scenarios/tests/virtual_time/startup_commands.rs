@@ -40,7 +40,7 @@ fn world(network: Network, change: impl Fn(SubDeviceConfig) -> SubDeviceConfig) 
 
 /// Writes that the device received, without reads: object or IDN, value, state.
 fn written(world: &World) -> Vec<(AlState, String, Vec<u8>)> {
-    let told = |mail: &ServedMail| match mail.protocol {
+    let reports = |mail: &ServedMail| match mail.protocol {
         Protocol::Coe => match SdoRequest::decode(&mail.payload).ok()? {
             SdoRequest::DownloadExpedited { index, sub_index, complete_access, data }
             | SdoRequest::DownloadNormal { index, sub_index, complete_access, data, .. } => {
@@ -56,7 +56,7 @@ fn written(world: &World) -> Vec<(AlState, String, Vec<u8>)> {
         _ => None,
     };
     let device = world.network().device(DeviceIndex(DRIVE));
-    device.application.served_mail().iter().filter_map(told).collect()
+    device.application.served_mail().iter().filter_map(reports).collect()
 }
 
 /// Commands of every kind at every transition, not declared in the order of the transitions.
@@ -145,12 +145,12 @@ fn a_refused_idn_is_reported_with_its_number_and_code() {
         config.sdo(0x2001, 1, [1, 1]).idn_at(Transition::So, 0, Idn::standard(0, 1), [0xF4, 1])
     });
     world.run_cycles(300);
-    let told = |event: &Event| {
+    let reports = |event: &Event| {
         matches!(event, Event::ConfigurationFailed { subdevice: SubDeviceId(DRIVE), reason }
             if reason.starts_with("start-up command 1 (SAFEOP to OP): SoE drive 0 S-0-0001 elements 0x40: refused by \
                 the drive"))
     };
-    assert!(world.saw(world.beginning(), told), "{:?}", troubles(world.events(world.beginning())));
+    assert!(world.saw(world.beginning(), reports), "{:?}", troubles(world.events(world.beginning())));
     let others = world.network().devices().enumerate().filter(|(number, _)| *number != DRIVE);
     assert!(others.into_iter().all(|(_, device)| device.al_status().al_state() == Some(AlState::Op)));
 }

@@ -1,4 +1,4 @@
-//! Start-up commands that read IDNs, transfer files, or send messages of AoE and VoE: judged by what the SubDevice has
+//! Start-up commands that read IDNs, transfer files, or send messages of AoE and VoE: checked by what the SubDevice has
 //! served.
 
 use ringcat::{
@@ -79,7 +79,7 @@ fn idns_are_read_and_compared_or_reported() {
     let world = world(&[(Transition::Ip, same), (Transition::So, StartupAction::IdnRead(read(1)))]);
     let states: Vec<AlState> = served(&world, Protocol::Soe).into_iter().map(|(state, _)| state).collect();
     assert_eq!(states, [AlState::PreOp, AlState::SafeOp]);
-    let told: Vec<_> = world
+    let reports: Vec<_> = world
         .events(world.beginning())
         .iter()
         .filter_map(|timed| match &timed.event {
@@ -90,7 +90,7 @@ fn idns_are_read_and_compared_or_reported() {
         })
         .collect();
     let source = StartupSource::Idn { drive: 0, idn: Idn::standard(0, 1) };
-    assert_eq!(told, [(1, source, Some("a look".to_owned()), held)]);
+    assert_eq!(reports, [(1, source, Some("a look".to_owned()), held)]);
 }
 
 // covers: 6.6, startup-commands

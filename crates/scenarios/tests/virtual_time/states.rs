@@ -42,8 +42,8 @@ fn state(world: &World, device: usize) -> AlStatus {
 /// Only one SubDevice has left OP, and no cycle was incomplete.
 fn assert_undisturbed(world: &World, since: Mark, but: usize) {
     assert_eq!(world.incomplete(since), 0, "incomplete cycles");
-    assert!(world.judged(since).iter().all(|judged| judged.status.state == ringcat::DomainState::Complete));
-    assert!(world.judged(since).iter().all(|judged| judged.stale.iter().all(|stale| *stale == but)));
+    assert!(world.evaluated(since).iter().all(|evaluated| evaluated.status.state == ringcat::DomainState::Complete));
+    assert!(world.evaluated(since).iter().all(|evaluated| evaluated.stale.iter().all(|stale| *stale == but)));
     assert!(world.left_op(since).iter().all(|device| device.0 == but), "{:?}", world.left_op(since));
 }
 
@@ -70,7 +70,7 @@ fn state_changes_of_each_of_16_leave_all_cycles_complete() {
             assert_eq!(state(&world, device), AlStatus::new(AlState::Op));
             assert_undisturbed(&world, mark, device);
             assert_eq!(registers(&world, device), before, "the whole configuration is back");
-            let last = world.judged(mark).last().expect("cycles");
+            let last = world.evaluated(mark).last().expect("cycles");
             assert_eq!((last.status.wkc, last.stale.len()), (last.status.expected, 0));
         }
     }
@@ -298,8 +298,8 @@ fn a_subdevice_lost_during_its_bring_up_makes_cycles_incomplete() {
     let mut world = World::in_op(8, line(descriptions(&KINDS), NetworkOptions::default()));
     let last = KINDS.len() - 1;
     let is_missed = |world: &World| {
-        let judged = world.judged(world.beginning()).last().expect("cycles went by");
-        judged.status.state != ringcat::DomainState::Complete
+        let evaluated = world.evaluated(world.beginning()).last().expect("cycles went by");
+        evaluated.status.state != ringcat::DomainState::Complete
     };
     assert_eq!(request(&mut world, last, AlState::PreOp), Ok(()));
     world.run_cycles(5);

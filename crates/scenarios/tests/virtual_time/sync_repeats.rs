@@ -1,4 +1,4 @@
-//! Outputs of SubDevices with SYNC0 signals that are sent again within their cycle: judged inside the SubDevices, by
+//! Outputs of SubDevices with SYNC0 signals that are sent again within their cycle: evaluated inside the SubDevices, by
 //! the true times of their writes and of their signals.
 
 use std::time::Duration;
@@ -104,7 +104,7 @@ fn world(count: usize, in_ring: bool, shifts: impl Fn(usize) -> i32) -> World {
     };
     let mut world = World::with(0, network, &Options::default(), declare).expect("it starts");
     world.settle();
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     world.run_cycles(LEARNING);
     world
 }

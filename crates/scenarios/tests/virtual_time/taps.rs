@@ -1,4 +1,4 @@
-//! A tap of all frames that is switched on and off in operation, with and without an application; judged by the frames
+//! A tap of all frames that is switched on and off in operation, with and without an application; checked by the frames
 //! on the links. Ethernet debug messages.
 
 use std::time::Duration;

@@ -48,8 +48,8 @@ fn a_subdevice_without_a_cable_in_port_0_is_reported_and_works() {
     let kinds = ["coupler", "digital-output-8", "servo"];
     let cables = [(MAIN, at(0, A)), (at(0, B), at(1, A)), (at(1, B), at(2, B))];
     let world = in_op(wired(&kinds, &cables));
-    let told = |event: &Event| matches!(event, Event::UnconnectedPort0 { position } if position.0 == 2);
-    assert!(world.saw(world.beginning(), told));
+    let reports = |event: &Event| matches!(event, Event::UnconnectedPort0 { position } if position.0 == 2);
+    assert!(world.saw(world.beginning(), reports));
     assert_eq!(crossed(world.events(world.beginning())), [(Some(2), Some(1))]);
 }
 
@@ -68,7 +68,11 @@ fn a_crossed_subdevice_in_a_closed_ring_is_located_and_works() {
         let mark = world.mark();
         world.cut(CableId(cable));
         world.run_cycles(60);
-        assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete), "cable {cable}");
+        assert_eq!(
+            world.evaluated(mark).last().map(|evaluated| evaluated.delivery),
+            Some(Delivery::Complete),
+            "cable {cable}"
+        );
         world.heal(CableId(cable));
         world.run_cycles(60);
         assert_eq!(world.left_op(mark), []);
@@ -93,8 +97,8 @@ fn a_subdevice_with_one_port_leaves_the_ring_open_which_is_reported() {
         (RingState::Open, 2, 2)
     );
     assert!(matches!(status.redundancy, Redundancy::Lost { cause: RedundancyLoss::Open, .. }));
-    let told = |event: &Event| matches!(event, Event::RingOpened { main: 2, redundant: 2 });
-    assert!(world.saw(world.beginning(), told));
+    let reports = |event: &Event| matches!(event, Event::RingOpened { main: 2, redundant: 2 });
+    assert!(world.saw(world.beginning(), reports));
     let mark = world.mark();
     world.cut(CableId(2));
     world.run_cycles(100);
@@ -135,7 +139,7 @@ fn a_ring_with_a_branch_keeps_all_in_op_when_any_cable_of_the_ring_is_cut() {
             let mark = world.mark();
             world.cut(CableId(cable));
             world.run_cycles(60);
-            assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete));
+            assert_eq!(world.evaluated(mark).last().map(|evaluated| evaluated.delivery), Some(Delivery::Complete));
             world.heal(CableId(cable));
             world.run_cycles(60);
             assert_eq!(world.left_op(mark), [], "branch on {port:?}, cable {cable}");
@@ -155,7 +159,7 @@ fn a_branch_that_is_cut_off_returns_while_the_ring_continues() {
             let mark = world.mark();
             world.cut(CableId(6));
             world.run_cycles(gap);
-            let stale = &world.judged(mark).last().expect("cycles went by").stale;
+            let stale = &world.evaluated(mark).last().expect("cycles went by").stale;
             let names: Vec<_> = stale.iter().filter_map(|subdevice| world.device_of(*subdevice)).collect();
             assert!(names.iter().all(|device| [5, 6].contains(&device.0)), "{names:?} are stale");
             world.heal(CableId(6));
@@ -196,7 +200,7 @@ fn a_tree_comes_to_op_and_its_branches_do_not_depend_on_each_other() {
             .until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
         world.run_cycles(30);
         assert!(world.left_op(mark).iter().all(|device| behind.contains(&device.0)));
-        assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Complete));
+        assert_eq!(world.evaluated(mark).last().map(|evaluated| evaluated.delivery), Some(Delivery::Complete));
     }
 }
 
@@ -270,7 +274,7 @@ fn enhanced_detection_repeats_when_ports_change_and_costs_two_edges() {
     world.until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
     world.run_cycles(200);
     assert_eq!(crossed(world.events(mark)), []);
-    assert_eq!(ring_events(world.events(mark)), Vec::<&Event>::new(), "a controlled break is not told");
+    assert_eq!(ring_events(world.events(mark)), Vec::<&Event>::new(), "a controlled break is not reported");
     assert_eq!(world.application().ring(), RingState::Closed);
     assert!(world.left_op(mark).iter().all(|device| device.0 == 6));
     assert!(lost_links(&world) > before, "the redundant link was down in between");
@@ -286,6 +290,6 @@ fn links_that_cannot_be_taken_down_fall_back_to_simple_detection() {
     let mut events = Vec::new();
     main_device.scan_with(|event| events.push(event.clone())).expect("the segment answers");
     assert_eq!(crossed(&events), [(None, None)]);
-    let told = |timed: &TimedEvent| timed.event == Event::CannotDisconnect { link: Link::Redundant };
-    assert_eq!(events.iter().filter(|timed| told(timed)).count(), 1);
+    let reports = |timed: &TimedEvent| timed.event == Event::CannotDisconnect { link: Link::Redundant };
+    assert_eq!(events.iter().filter(|timed| reports(timed)).count(), 1);
 }

@@ -1,5 +1,5 @@
 //! Start-up commands beside the way to OP: on the ways to INIT, to BOOT and back, and at a state that is requested
-//! again. Mail is judged by what the SubDevice has served and in which state, registers by their contents.
+//! again. Mail is evaluated by what the SubDevice has served and in which state, registers by their contents.
 
 use std::time::Duration;
 

@@ -29,7 +29,7 @@ fn world(network: Network, declared: usize) -> World {
     let declare = |scan: &ringcat::Scan| automatic(&scan.subdevices[..declared], CYCLE);
     let mut world = World::with(1, network, &Options::default(), declare).expect("scan and activation");
     world.settle();
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     world
 }
 
@@ -94,7 +94,7 @@ fn a_subdevice_with_the_address_of_a_member_gets_another_one() {
         };
         let mut world = World::with(2, six(true), &Options::default(), declare).expect("scan and activation");
         world.settle();
-        world.judge_latched(false);
+        world.evaluate_latched(false);
         let mark = world.mark();
         let before = stations(&world);
         let bus = world.application().engine().bus();
@@ -168,7 +168,7 @@ fn identical_neighbours_keep_their_places_from_either_side() {
         for order in [[2, 3], [3, 2]] {
             for pause in [0, 1, 30] {
                 let mut world = World::in_op(4, ring(descriptions(&kinds), NetworkOptions::default()));
-                world.judge_latched(false);
+                world.evaluate_latched(false);
                 cut.into_iter().for_each(|cable| world.cut(CableId(cable)));
                 world.run_cycles(100);
                 let before = stations(&world);
@@ -196,7 +196,7 @@ fn identical_neighbours_keep_their_places_when_the_ring_closes_meanwhile() {
     for step in 0..60 {
         let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(1_500));
         let mut world = World::in_op(7, ring(descriptions(&kinds), options));
-        world.judge_latched(false);
+        world.evaluate_latched(false);
         let before = stations(&world);
         [2, 3].into_iter().for_each(|device| world.power_off(DeviceIndex(device)));
         world.run_cycles(20);
@@ -213,7 +213,7 @@ fn identical_neighbours_keep_their_places_when_the_ring_closes_meanwhile() {
 fn after_a_loss_of_power_all_subdevices_return_to_their_places() {
     let kinds = ["digital-output-8"; 100];
     let mut world = World::in_op(6, ring(descriptions(&kinds), NetworkOptions::default()));
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     let before = stations(&world);
     (0..kinds.len()).for_each(|device| world.power_off(DeviceIndex(device)));
     world.run_cycles(100);
@@ -238,7 +238,7 @@ fn an_optional_subdevice_does_not_take_the_place_of_an_identical_one() {
         declaration
     })
     .expect("scan and activation");
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     world.run_cycles(300);
     let before = stations(&world);
     world.power_off(DeviceIndex(1));
@@ -304,7 +304,7 @@ fn torture(seed: u64) {
     let detection = Duration::from_micros(*dice.pick(&[10, 200, 1000, 5000]));
     let options = NetworkOptions::default().with_detection_delay(detection);
     let mut world = World::in_op(seed, ring(descriptions(&kinds), options));
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     let before = stations(&world);
     let cables = kinds.len() + 1;
     for _ in 0..30 {

@@ -82,7 +82,7 @@ impl Stamped {
         let mut world = World::with(seed, network, &options, declare).expect("it fits");
         world.settle();
         // Its checks assume one cycle under way.
-        world.judge_latched(false);
+        world.evaluate_latched(false);
         let directory = world.application().directory();
         let all = (0..world.scan.subdevices.len()).flat_map(|subdevice| directory.areas(SubDeviceId(subdevice)));
         let inputs = all.filter(|area| area.direction == Inputs && area.placed.area.length > 0);

@@ -190,8 +190,8 @@ fn sleep_states_are_no_harm_where_programs_may_prevent_them() {
     let specimen = Specimen::good();
     specimen.write(&format!("{CPU}/cpu1/cpuidle/state2/disable"), b"0");
     specimen.write("dev/cpu_dma_latency", b"");
-    assert_finding(&specimen.look(), "c-states", Level::Good, "programs with --priority may prevent it", "");
+    assert_finding(&specimen.checks(), "c-states", Level::Good, "programs with --priority may prevent it", "");
     fs::remove_dir_all(specimen.root.join(CPU).join("cpu0/cpuidle")).expect("it is ours");
     fs::remove_dir_all(specimen.root.join(CPU).join("cpu1/cpuidle")).expect("it is ours");
-    assert_finding(&specimen.look(), "c-states", Level::Good, "the kernel uses none", "");
+    assert_finding(&specimen.checks(), "c-states", Level::Good, "the kernel uses none", "");
 }

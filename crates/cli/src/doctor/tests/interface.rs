@@ -74,7 +74,7 @@ fn what_the_kernel_and_the_driver_tell_of_an_interface_is_judged() {
     for (id, level, what, mend, change) in USES.into_iter().chain(DEVICE) {
         let mut specimen = Specimen::good();
         change(&mut specimen);
-        let findings = specimen.look();
+        let findings = specimen.checks();
         assert_finding(&findings, id, level, what, mend);
         assert_eq!(of(&findings, id).interface.as_deref(), Some(NAME));
     }
@@ -92,7 +92,7 @@ fn all_addresses_are_one_finding() {
         let address = address.parse().expect("an address");
         note(&mut specimen, UseWarning::Address { interface: NAME.into(), address });
     }
-    let findings = specimen.look();
+    let findings = specimen.checks();
     assert_finding(&findings, "address", Level::Bad, "192.0.2.2, 192.0.2.3, fe80::1, 2001:db8::1", "disable_ipv6=1");
     assert_eq!(of(&findings, "address").mend.len(), 2);
 }
@@ -104,9 +104,9 @@ fn a_virtual_interface_has_no_interrupts_that_could_wait() {
     specimen.settings.driver = Ok(Driver { name: "veth".into(), bus: String::new() });
     specimen.settings.coalescing = Err(NoAnswer::NotSupported);
     specimen.settings.eee = Err(NoAnswer::NotSupported);
-    let findings = specimen.look();
+    let findings = specimen.checks();
     assert_eq!(of(&findings, "driver").level, Level::Minor);
     assert_eq!((of(&findings, "coalescing").level, of(&findings, "eee").level), (Level::Good, Level::Good));
     specimen.interface.loopback = true;
-    assert_finding(&specimen.look(), "link", Level::Bad, "loopback", "ip link");
+    assert_finding(&specimen.checks(), "link", Level::Bad, "loopback", "ip link");
 }

@@ -8,9 +8,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use ringcat_link::interface::ethtool::{Coalescing, Driver, Eee, Link, Offloads, Settings};
 use ringcat_link::interface::{Interface, Uses};
 
+use super::super::check_all;
 use super::super::finding::{Finding, Level, lines};
-use super::super::look::Look;
-use super::super::look_at;
+use super::super::inspect::Inspect;
 
 /// As long as names of interfaces can be.
 pub const NAME: &str = "enp12s0f1np1abc";
@@ -30,7 +30,7 @@ impl Drop for Specimen {
     }
 }
 
-impl Look for Specimen {
+impl Inspect for Specimen {
     fn root(&self) -> &Path {
         &self.root
     }
@@ -139,8 +139,8 @@ impl Specimen {
         fs::write(place, bytes).expect("it is ours");
     }
 
-    pub fn look(&self) -> Vec<Finding> {
-        look_at(self, &[NAME]).expect("the interface is there")
+    pub fn checks(&self) -> Vec<Finding> {
+        check_all(self, &[NAME]).expect("the interface is there")
     }
 }
 
@@ -155,7 +155,7 @@ pub fn of<'a>(findings: &'a [Finding], id: &str) -> &'a Finding {
 pub fn with(files: &[(&str, &str)]) -> Vec<Finding> {
     let specimen = Specimen::good();
     files.iter().for_each(|(path, text)| specimen.write(path, text.as_bytes()));
-    specimen.look()
+    specimen.checks()
 }
 
 pub fn assert_finding(findings: &[Finding], id: &str, level: Level, what: &str, mend: &str) {

@@ -9,6 +9,7 @@ use super::Scan;
 use crate::link::LinkSet;
 use crate::order::InOrder;
 use crate::procedures::cabling::{Known, cabling, stays_closed};
+use crate::procedures::shared_segment::SharedSegment;
 use crate::ring::RingState;
 use crate::segment::findings::CablingFindings;
 use crate::segment::{LineCheck, is_swapped};
@@ -16,13 +17,12 @@ use crate::supervisor::Bus;
 use crate::topology::{Closing, Finding, PortOf};
 
 /// Finds crossed SubDevices while the redundant link is down; false if the ring is not closed or changes meanwhile.
-pub(super) async fn locate_crossings(bus: &Bus, scan: &mut Scan) -> bool {
+pub(super) async fn locate_crossings(bus: &Bus, segment: &SharedSegment, scan: &mut Scan) -> bool {
     if !stays_closed(bus).await {
         return false;
     }
-    let Some(found) = cabling(bus, scan, true, &LineCheck::default()).await.map(|seen| seen.crossings) else {
-        return false;
-    };
+    let seen = cabling(bus, &Scanned { scan, segment }, true, &LineCheck::default()).await;
+    let Some(found) = seen.map(|seen| seen.crossings) else { return false };
     let node = |station: StationAddress| scan.subdevices.iter().position(|info| info.station == station);
     let exact = found.iter().filter_map(|crossing| {
         Some(Finding::CrossedLine { node: node(crossing.subdevice?.0)?, entry_port: crossing.entry_port? })
@@ -39,7 +39,17 @@ pub(super) async fn locate_crossings(bus: &Bus, scan: &mut Scan) -> bool {
     true
 }
 
-impl Known for Scan {
+/// What the scan under way has found.
+struct Scanned<'a> {
+    scan: &'a Scan,
+    segment: &'a SharedSegment,
+}
+
+impl Known for Scanned<'_> {
+    fn segment(&self) -> &SharedSegment {
+        self.segment
+    }
+
     fn note_port_scan(&self) {}
 
     fn are_measuring(&self) -> bool {
@@ -51,17 +61,17 @@ impl Known for Scan {
     }
 
     fn ports(&self, station: StationAddress) -> [PortKind; 4] {
-        let info = self.subdevices.iter().find(|info| info.station == station);
+        let info = self.scan.subdevices.iter().find(|info| info.station == station);
         info.map(|info| info.controller.ports).unwrap_or_default()
     }
 
     fn closings(&self, stations: &[StationAddress]) -> Vec<Closing> {
         // Positions are unchanged so shortly after the scan.
         let place = |at: PortOf| {
-            let station = self.subdevices.get(at.node)?.station;
+            let station = self.scan.subdevices.get(at.node)?.station;
             Some(PortOf { node: stations.iter().position(|it| *it == station)?, port: at.port })
         };
-        let rings = self.topology.local_rings.iter().map(|ring| ring.closing);
+        let rings = self.scan.topology.local_rings.iter().map(|ring| ring.closing);
         rings.filter_map(|it| Some(Closing { head: place(it.head)?, tail: place(it.tail)? })).collect()
     }
 

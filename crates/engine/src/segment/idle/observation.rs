@@ -6,10 +6,10 @@ use alloc::string::String;
 use ringcat_wire::address::StationAddress;
 
 use crate::ring::RingState;
-use crate::segment::ring::Words;
 use crate::segment::scan::Found;
 use crate::segment::undeclared::StateRead;
 use crate::segment::versions::Versions;
+use crate::segment::words::Words;
 
 /// An observation without an application. Answers of broadcasts are [`Words`].
 #[derive(Debug)]

@@ -13,8 +13,8 @@ use crate::segment::breaks::{is_broken, locate_breaks};
 use crate::segment::effect::Effects;
 use crate::segment::model::Segment;
 use crate::segment::reading::Reading;
-use crate::segment::ring::Words;
 use crate::segment::versions::Versions;
+use crate::segment::words::Words;
 use crate::time::Instant;
 use crate::topology::{NodeStatus, are_doubtful, ends_of_break};
 

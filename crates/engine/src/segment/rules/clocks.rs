@@ -57,7 +57,7 @@ impl Segment {
 
     fn observe_set_up(&mut self, effects: &mut Effects) {
         self.clocks.life = Life::Running(Running::default());
-        self.compared.begin(&self.board);
+        self.words.before.begin(&self.board);
         // What the exchange predicts until it has read a reference: the application's time may be another one by now.
         let epoch = self.clocks.epoch;
         self.board.clocks.times.post_timeline(self.clocks.times.turn(0, (0, 0), epoch));

@@ -3,29 +3,17 @@
 use alloc::rc::Rc;
 use alloc::string::String;
 
-use ringcat_wire::register::EcatEvent;
-
 use crate::event::Event;
 use crate::ring::RingState;
-use crate::ring_status::LinkCounts;
 use crate::segment::effect::{Effects, Task, Watch};
 use crate::segment::idle::{Change, Comparison, Differences, IdleObservation, PATIENCE, SILENT, Work};
 use crate::segment::model::Segment;
-use crate::segment::ring::Words;
 use crate::segment::scan::Found;
 use crate::segment::stage::Stage;
 use crate::segment::undeclared::{ShownState, StateRead};
 use crate::segment::versions::Versions;
+use crate::segment::words::{Broadcast, Words};
 use crate::time::Instant;
-
-/// What a broadcast has shown.
-#[derive(Clone, Copy, Debug, Default)]
-struct Shown {
-    counts: LinkCounts,
-    al_status: u8,
-    ports_changed: bool,
-    is_unplugged: bool,
-}
 
 impl Segment {
     /// Whether a procedure of idle operation works on the segment.
@@ -49,19 +37,13 @@ impl Segment {
         (*ended >= number).then_some(differences)
     }
 
-    /// Processes the answer to a broadcast. The word is compared with what the list of SubDevices lets expect; in
-    /// operation, where states change by the application's own steps, with the word of the last round (`attention`).
+    /// Processes the answer to a broadcast. It is compared with what the list of SubDevices lets expect; in operation,
+    /// where states change by the application's own steps, words are compared with those of the last round.
     pub(in crate::segment) fn observe_idle_words(&mut self, words: &Words, now: Instant, effects: &mut Effects) {
-        self.ring.observe_carriers(words.carriers, now, effects);
-        let Some((_, supervision)) = words.supervision else { return };
+        self.ring.observe_carriers(words.carriers(), now, effects);
+        let Some(shown) = words.broadcast() else { return };
         self.idle.silent = 0;
-        let shown = Shown {
-            counts: LinkCounts { main: supervision.main.0, redundant: supervision.redundant.0 },
-            al_status: supervision.al_status[0] | supervision.al_status[1],
-            ports_changed: EcatEvent::from_bits(supervision.irq).dl_status,
-            is_unplugged: false,
-        };
-        self.evaluate_broadcast(shown, words.ring.state, now, effects);
+        self.evaluate_broadcast(shown, words.ring_state(), now, effects);
     }
 
     /// Processes an observation without an application.
@@ -75,6 +57,7 @@ impl Segment {
             IdleObservation::Watched(carriers, state) => {
                 self.idle = self.idle.renewed();
                 self.ring.begin_idle(carriers, state);
+                self.words.begin_idle();
             }
             IdleObservation::Unanswered(words) => self.observe_silence_of_all(&words, now, effects),
             IdleObservation::Scanned => self.idle.end(Work::FirstScan),
@@ -106,21 +89,21 @@ impl Segment {
 
     /// A broadcast was lost, or no link has a carrier. A single lost frame is no evidence yet.
     fn observe_silence_of_all(&mut self, words: &Words, now: Instant, effects: &mut Effects) {
-        self.ring.observe_carriers(words.carriers, now, effects);
+        self.ring.observe_carriers(words.carriers(), now, effects);
         let is_unplugged = words.is_unplugged();
         if !is_unplugged {
             self.idle.silent = self.idle.silent.saturating_add(1);
         }
         if is_unplugged || self.idle.silent >= SILENT {
-            self.evaluate_broadcast(Shown { is_unplugged, ..Shown::default() }, words.ring.state, now, effects);
+            self.evaluate_broadcast(Broadcast::unanswered(is_unplugged), words.ring_state(), now, effects);
         }
     }
 
-    fn evaluate_broadcast(&mut self, shown: Shown, ring: RingState, now: Instant, effects: &mut Effects) {
+    fn evaluate_broadcast(&mut self, shown: Broadcast, ring: RingState, now: Instant, effects: &mut Effects) {
         if self.is_scanning() || self.is_active() {
             return;
         }
-        self.ring.observe_broadcast(ring, shown.counts, now, effects);
+        self.ring.observe_broadcast(ring, shown.counts(), now, effects);
         if self.idle.is_visible() {
             self.note_change(&shown, effects);
         }
@@ -128,7 +111,7 @@ impl Segment {
             return;
         }
         let Some(scanned) = self.found().map(|found| found.counts()) else {
-            if shown.counts != LinkCounts::default() {
+            if shown.has_answer() {
                 self.begin_scan(false);
                 self.begin_work((Work::FirstScan, Task::ScanSegment), effects);
             }
@@ -142,35 +125,31 @@ impl Segment {
             self.idle.compared = Comparison::Same(scanned);
         }
         let wanted = self.idle.wanted();
-        if self.idle.compared != Comparison::Same(shown.counts) || shown.ports_changed || wanted.is_some() {
+        let is_same = matches!(self.idle.compared, Comparison::Same(scanned) if shown.shows(scanned));
+        if !is_same || wanted.is_some() {
             return self.follow_change(shown, wanted, effects);
         }
-        self.compare_states(shown.al_status, effects);
+        self.compare_states(shown, effects);
     }
 
     /// An unexpected OR of the states: which SubDevice shows it is read at once. States that others hide in the OR, and
     /// addresses, are read in turn.
-    fn compare_states(&mut self, al_status: u8, effects: &mut Effects) {
-        let is_other = self.expected_states().is_some_and(|expected| al_status != expected);
-        if !is_other {
-            self.idle.read_for = None;
-        } else if self.idle.read_for != Some(al_status) && self.are_undeclared_settled() {
-            self.idle.read_for = Some(al_status);
+    fn compare_states(&mut self, shown: Broadcast, effects: &mut Effects) {
+        let expected = self.expected_states();
+        if self.words.scan.has_other_states(&shown, expected) && self.are_undeclared_settled() {
+            self.words.scan.note_read_for(&shown);
             self.begin_work((Work::ReadStates, Task::ReadStates), effects);
         }
     }
 
     /// Another number of SubDevices is reported at once, also while a procedure works on the segment: what it finds is
     /// outdated then.
-    fn note_change(&mut self, shown: &Shown, effects: &mut Effects) {
-        let counts = shown.counts;
+    fn note_change(&mut self, shown: &Broadcast, effects: &mut Effects) {
         // The first scan counts by itself.
         let Some(found) = self.found().map(|found| found.counts()) else { return };
-        let is_counted = self.idle.counted.replace(counts).unwrap_or(found) == counts;
-        if !is_counted {
+        if self.words.scan.has_other_count(shown, found) {
+            let counts = shown.counts();
             effects.report(Event::Counted { main: counts.main, redundant: counts.redundant });
-        }
-        if !is_counted {
             self.idle.changes = self.idle.changes.wrapping_add(1);
         }
     }
@@ -181,8 +160,8 @@ impl Segment {
     }
 
     /// The segment has changed, or a rescan is requested.
-    fn follow_change(&mut self, shown: Shown, wanted: Option<u64>, effects: &mut Effects) {
-        let Shown { counts, ports_changed, is_unplugged, .. } = shown;
+    fn follow_change(&mut self, shown: Broadcast, wanted: Option<u64>, effects: &mut Effects) {
+        let (counts, ports_changed, is_unplugged) = (shown.counts(), shown.ports_changed(), shown.is_unplugged());
         if matches!(self.idle.compared, Comparison::Same(_)) {
             self.idle.compared = Comparison::CHANGED;
         }
@@ -206,7 +185,8 @@ impl Segment {
         let (added, removed) = (differences.added.len(), differences.removed.len());
         let (subdevices, counts) = (found.subdevices.len(), found.counts());
         self.find_again(versions, found);
-        (self.idle.compared, self.idle.counted) = (Comparison::Same(counts), Some(counts));
+        self.idle.compared = Comparison::Same(counts);
+        self.words.scan.begin(Some(counts));
         self.idle.readdressed.clear();
         if self.has_untouched() {
             self.take_over(now);

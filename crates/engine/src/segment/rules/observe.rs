@@ -11,9 +11,10 @@ use crate::segment::cable_watch::CableWatch;
 use crate::segment::effect::Effects;
 use crate::segment::model::Segment;
 use crate::segment::observation::Observation;
-use crate::segment::ring::{Cabled, Words};
+use crate::segment::ring::Cabled;
 use crate::segment::versions::Versions;
 use crate::segment::wake::Wake;
+use crate::segment::words::Words;
 use crate::time::Instant;
 
 /// Pause between two tests of the number of datagrams per frame. Long frames delay a cycle, so there is a pause
@@ -24,7 +25,7 @@ impl Segment {
     /// Processes an observation. The effects must be executed in their order.
     pub fn observe(&mut self, seen: Observation<'_>, now: Instant) -> Effects {
         let mut effects = Effects::default();
-        let is_apart = matches!(seen, Observation::Words(_) | Observation::Clocks(_));
+        let is_apart = matches!(seen, Observation::Words(_) | Observation::Clocks(_) | Observation::Link(_));
         self.observed = self.observed.wrapping_add(u32::from(!is_apart));
         self.take(seen, now, &mut effects);
         self.hot_connect.observe(&self.subdevices, &mut effects);
@@ -36,12 +37,12 @@ impl Segment {
     fn take(&mut self, seen: Observation<'_>, now: Instant, effects: &mut Effects) {
         use Observation::*;
         match seen {
-            Words(words) if self.is_active() => self.observe_words(&words, now, effects),
-            Words(words) => self.observe_idle_words(&words, now, effects),
+            Words(words) => self.observe_words(&words, now, effects),
+            Link(seen) => self.link_control.observe(seen, effects),
             Idle(seen) => self.observe_idle(seen, now, effects),
             PartOfRound { versions: v, readings: r, others: o, counted: c } => self.observe_part(v, r, o, c),
             Round(round_result) => self.observe_round(&round_result, now, effects),
-            RoundEnded(number) => self.attention.end(number, now),
+            RoundEnded(number) => self.end_round(number, now),
             RoundWanted => self.attention.want(),
             RoundWantedIn(pause) => self.attention.again_in(pause, now),
             FramesTested => self.frames_tested_until = now + FRAME_TESTS,
@@ -53,7 +54,7 @@ impl Segment {
             FoundAgain { versions, found } => self.find_again(versions, found),
             Activated(declared) => self.activate(*declared, effects),
             Attached => self.begin_procedures(effects),
-            Deactivated => self.deactivate(),
+            Deactivated => self.deactivate(effects),
             #[cfg(feature = "standby")]
             Standby(seen) => self.observe_standby(seen, effects),
             SiiCompleted { key, read } => self.observe_whole_sii(key, read, effects),
@@ -94,6 +95,12 @@ impl Segment {
         }
     }
 
+    /// A round has ended; `number` is the latest result's.
+    fn end_round(&mut self, number: Option<u32>, now: Instant) {
+        self.attention.end(now);
+        self.words.round.end(number);
+    }
+
     fn limit_frames(&mut self, versions: Versions, limit: FrameLimit, effects: &mut Effects) {
         if versions.cabling != self.cabling.version || !self.was_all_in_reach(versions.isolations) {
             return;
@@ -120,16 +127,19 @@ impl Segment {
     }
 
     fn observe_words(&mut self, words: &Words, now: Instant, effects: &mut Effects) {
-        self.compared.observe(words, self.board.clocks.holds(), &self.clocks);
+        if !self.is_active() {
+            return self.observe_idle_words(words, now, effects);
+        }
+        self.words.before.observe(words, self.board.clocks.holds(), &self.clocks);
         if !self.choices.supervision {
             return;
         }
         let disturbance = self.slot.running();
         let cabled = Cabled { topology: &self.cabling.topology, cables: &self.cabling.cables };
-        let ring = self.ring.observe(words, disturbance, &cabled, now, effects);
+        let ring = self.ring.observe((&mut self.words, words), disturbance, &cabled, now, effects);
         let silence = self.observe_silence(words, now, effects);
         let reported = self.ring.reported();
-        let evaluation = self.attention.observe(words, reported, disturbance, now, effects);
+        let evaluation = self.attention.observe((&mut self.words, words), reported, disturbance, now, effects);
         self.attention.wake = ring.or(evaluation).or(silence.map_or(Wake::NEVER, Wake::at));
     }
 }

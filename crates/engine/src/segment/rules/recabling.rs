@@ -14,9 +14,9 @@ use crate::segment::cabling::{Cabling, End, stations_by_position};
 use crate::segment::effect::{Effect, Effects};
 use crate::segment::member::Phase;
 use crate::segment::model::Segment;
-use crate::segment::ring::Words;
 use crate::segment::seen::Seen;
 use crate::segment::versions::Versions;
+use crate::segment::words::Words;
 use crate::topology::PortOf;
 
 /// The ends of a cable, with the SubDevices there.
@@ -26,11 +26,11 @@ impl Segment {
     /// Whether a rescan can be taken over: no break and no missing SubDevice would be lost from the model.
     pub fn is_whole(&self, words: &Words) -> bool {
         let is_missed = self.members().any(|member| !member.config.optional && member.phase == Phase::Absent);
-        (words.links == LinkSet::Single || self.is_closed(words)) && !is_missed
+        (words.links() == LinkSet::Single || self.is_closed(words)) && !is_missed
     }
 
     fn is_closed(&self, words: &Words) -> bool {
-        words.ring.state == RingState::Closed && self.ring.status.state == RingState::Closed
+        words.ring_state() == RingState::Closed && self.ring.status.state == RingState::Closed
     }
 
     /// Declared SubDevices are at other positions than at the scan.
@@ -54,7 +54,7 @@ impl Segment {
         if !self.are_places_valid(versions) || versions.cabling != self.cabling.version {
             return;
         }
-        let is_single = words.links == LinkSet::Single;
+        let is_single = words.links() == LinkSet::Single;
         let is_whole = is_single || (self.is_closed(words) && seen.topology.redundant_head.is_none());
         let is_there = |index: usize| seen.members.contains(&Some(index));
         let is_missed = self.members().enumerate().any(|(index, member)| !is_there(index) && !member.config.optional);
@@ -77,7 +77,7 @@ impl Segment {
         let now = Cabling {
             topology: seen.topology.clone(),
             stations: stations_by_position(&self.subdevices, seen.stations.iter().copied()),
-            cables: cables(seen.topology, words.links).into_iter().map(counted).collect(),
+            cables: cables(seen.topology, words.links()).into_iter().map(counted).collect(),
             closings: core::mem::take(&mut self.cabling.closings),
             version: self.cabling.version,
         };

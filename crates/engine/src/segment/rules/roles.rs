@@ -12,6 +12,10 @@ use crate::segment::start::Start;
 impl Segment {
     /// Observes what another MainDevice of the ring does.
     pub(super) fn observe_standby(&mut self, seen: StandbyObservation<'_>, effects: &mut Effects) {
+        // The procedures of the role before have ended.
+        if matches!(seen, StandbyObservation::TookOver { .. } | StandbyObservation::Yielded) {
+            self.link_control.restore(effects);
+        }
         match seen {
             StandbyObservation::TookOver { lives, is_hot } => self.take_bus(lives, is_hot, effects),
             StandbyObservation::Yielded => self.yield_bus(),
@@ -68,7 +72,7 @@ impl Segment {
         self.board.set_taking_part(index, exchanges);
     }
 
-    /// Another MainDevice controls the bus: attempts have ended, and what was altered for a moment is its matter now.
+    /// Another MainDevice controls the bus: attempts have ended, and it restores what was altered for a moment.
     fn yield_bus(&mut self) {
         self.slot = self.slot.emptied();
         self.altered.clear();

@@ -3,11 +3,11 @@
 use core::time::Duration;
 
 use crate::event::Event;
-use crate::link::{Link, LinkSet};
+use crate::link::Link;
 use crate::segment::disturbance::Disturbance;
 use crate::segment::effect::{Effects, Task};
 use crate::segment::model::Segment;
-use crate::segment::ring::Words;
+use crate::segment::words::Words;
 use crate::time::Instant;
 
 /// Interval of the check: lost frames post nothing.
@@ -34,10 +34,7 @@ impl Segment {
             return Some(self.silence.next);
         }
         self.silence.next = now + PAUSE;
-        let last = self.silence.last.get_or_insert((answered(words), now, words.cycles));
-        let seen = answered(words).or(last.0);
-        if seen != last.0 {
-            *last = (seen, now, words.cycles);
+        if self.words.answer.observe(words, now) {
             if core::mem::take(&mut self.silence.is_blocked) {
                 effects.report(Event::JunctionsBlocked { blocked: false, breaks: self.local_rings.broken() });
                 // The positions of SubDevices have to be determined again.
@@ -45,11 +42,10 @@ impl Segment {
             }
             return Some(self.silence.next);
         }
-        let sent = words.cycles.wrapping_sub(last.2);
-        let is_long = now.since(last.1) >= BLOCKED && sent >= BLOCKED_CYCLES;
+        let is_long = self.words.answer.is_older_than((BLOCKED, BLOCKED_CYCLES), words, now);
         // Without a carrier the cable of the interface is the cause.
         let several = self.cabling.topology.local_rings.len() > 1;
-        let at_once = several && Link::ALL.iter().all(|link| !has_no_carrier(words, *link));
+        let at_once = several && Link::ALL.iter().all(|link| !words.has_no_carrier(*link));
         let breaks = self.local_rings.broken();
         if is_long && (breaks > 0 || at_once) && !self.silence.is_blocked {
             self.silence.is_blocked = true;
@@ -61,19 +57,7 @@ impl Segment {
 
     /// Rings have been examined: no frame could return during that time.
     pub(in crate::segment) fn end_silence(&mut self, words: &Words, now: Instant) {
-        let before = self.silence.last.and_then(|(number, ..)| number);
-        self.silence.last = Some((answered(words).or(before), now, words.cycles));
+        self.words.answer.begin_again(words, now);
         self.silence.next = now + PAUSE;
     }
-}
-
-/// The number of a result that a SubDevice has answered: a frame that was processed by none did not return from the
-/// SubDevices, and in a closed ring of two links copies return unprocessed.
-fn answered(words: &Words) -> Option<u32> {
-    words.supervision.filter(|(_, seen)| seen.total().0 > 0).map(|(number, _)| number)
-}
-
-/// Whether a link in use has lost its carrier.
-fn has_no_carrier(words: &Words, link: Link) -> bool {
-    (link == Link::Main || words.links == LinkSet::Ring) && words.carriers[link.index()] == Some(false)
 }

@@ -22,7 +22,8 @@ impl Segment {
             self.addresses.change();
             self.subdevices = SubDevices::default();
             self.stage = Stage::Scanning { is_requested };
-            (self.idle.compared, self.idle.counted) = (Comparison::Open, None);
+            self.idle.compared = Comparison::Open;
+            self.words.scan.begin(None);
         }
     }
 
@@ -123,12 +124,13 @@ impl Segment {
 
     /// The application ends, or a scan is given up. What the last scan has found stays, and another declaration may
     /// follow at once.
-    pub(in crate::segment) fn deactivate(&mut self) {
+    pub(in crate::segment) fn deactivate(&mut self, effects: &mut Effects) {
         self.board.post_end();
         let scanned = self.stage.scanned().cloned();
         let subdevices = scanned.as_ref().map(|it| SubDevices::of_scan(&it.found)).unwrap_or_default();
         let stage = scanned.map_or(Stage::Unscanned, |it| Stage::Scanned(Scanned { registers: Start::Doubtful, ..it }));
         self.begin(stage, Declared { subdevices, ..Declared::default() });
+        self.link_control.restore(effects);
     }
 
     /// Begins a stage. Nothing of the last declaration remains; findings that were requested before are refused.
@@ -148,7 +150,7 @@ impl Segment {
         let (slot, choices, frames_tested_until) = (self.slot.emptied(), self.choices, self.frames_tested_until);
         // The procedures that would restore them have ended.
         let altered = self.altered();
-        let (idle, observed) = (self.idle.renewed(), self.observed);
+        let (idle, observed, link_control) = (self.idle.renewed(), self.observed, self.link_control);
         *self = Segment {
             stage,
             observed,
@@ -156,6 +158,7 @@ impl Segment {
             addresses,
             keeping,
             slot,
+            link_control,
             idle,
             frames_tested_until,
             first_attempt,

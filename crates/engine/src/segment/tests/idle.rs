@@ -18,7 +18,7 @@ fn found(stations: &[u16]) -> Scan {
 struct Idle {
     segment: Segment,
     now: Instant,
-    words: Words,
+    words: Posted,
 }
 
 impl Idle {
@@ -28,7 +28,7 @@ impl Idle {
         let (carriers, links) = ([Some(true); 2], LinkSet::Ring);
         segment.observe(Observation::Undeclared(UndeclaredObservation::KeepingBegun), Instant(0));
         segment.observe(Observation::Idle(IdleObservation::Watched(carriers, ring.state)), Instant(0));
-        let words = Words { links, carriers, ring, supervision: None, cycles: 0 };
+        let words = Posted { links, carriers, ring, supervision: None, cycles: 0 };
         Idle { segment, now: Instant(0), words }
     }
 
@@ -62,12 +62,12 @@ impl Idle {
     fn broadcast(&mut self, count: u16, al_status: u8) -> Vec<Effect> {
         self.now += PERIOD;
         let supervision = Supervision { main: Wkc(count), al_status: [al_status, 0], ..Supervision::default() };
-        self.observe(Observation::Words(Words { supervision: Some((0, supervision)), ..self.words }))
+        self.observe(Observation::Words(self.words.words().with_result(0, supervision)))
     }
 
     fn unanswered(&mut self) -> Vec<Effect> {
         self.now += PERIOD;
-        self.seen(IdleObservation::Unanswered(self.words))
+        self.seen(IdleObservation::Unanswered(self.words.words()))
     }
 
     fn followed(&mut self, stations: &[u16], wanted: Option<u64>) -> Vec<Effect> {

@@ -249,7 +249,7 @@ fn recable(ring: &mut Ring) {
     let topology = ring.segment.cabling.topology.clone();
     let stations = [station(0), station(2), station(1)];
     let seen = Seen { topology: &topology, stations: &stations, members: &[Some(0), Some(2), Some(1)] };
-    let words = ring.words;
+    let words = ring.words.words();
     ring.observe(Observation::Rescanned { versions, seen, words });
     assert_eq!(ring.segment.cabling.stations, stations);
 }
@@ -291,7 +291,7 @@ fn a_rescan_is_not_taken_over_after_the_cabling_or_an_address_has_changed() {
         let versions = ring.segment.versions();
         change(&mut ring);
         let (before, adoptions) = (ring.segment.cabling.stations.clone(), ring.segment.adoptions());
-        let (topology, words) = (ring.segment.cabling.topology.clone(), ring.words);
+        let (topology, words) = (ring.segment.cabling.topology.clone(), ring.words.words());
         let stations = [station(1), station(0), station(2)];
         let seen = Seen { topology: &topology, stations: &stations, members: &[Some(1), Some(0), Some(2)] };
         ring.observe(Observation::Rescanned { versions, seen, words });

@@ -20,7 +20,7 @@ const AL_STATES: u8 = 0x0F;
 /// # Errors
 /// The thread of the acyclic half has ended.
 pub fn overview(supervisor: &SupervisorThread) -> Result<SegmentOverview, Error> {
-    let asked = supervisor.with(|engine| (engine.ring_status(), engine.snapshot().activity, engine.subdevices().len()));
+    let asked = supervisor.act(|engine| (engine.ring_status(), engine.snapshot().activity, engine.subdevices().len()));
     let (ring, activity, found) = asked?;
     let read = RawDatagram::new(Command::Brd, Target::Broadcast(map::AL_STATUS), [0; 2]);
     let replies = supervisor.datagrams(vec![read.with_resend(true)]).unwrap_or_default();

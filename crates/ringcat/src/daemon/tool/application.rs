@@ -29,7 +29,7 @@ const MOST_SYNC_MANAGERS: u8 = 16;
 
 /// Declared SubDevices from an index on.
 pub(super) fn declared(supervisor: &SupervisorThread, from: u16) -> Result<Piece<DeclaredLine>, Error> {
-    supervisor.with(move |engine| {
+    supervisor.act(move |engine| {
         let (total, from) = (engine.declared_count(), usize::from(from));
         let indices = (from..total).take(MOST_DECLARED).map(SubDeviceId);
         let these = indices.filter_map(|index| engine.declared(index)).map(|declared| line(&declared));
@@ -144,9 +144,9 @@ pub(super) fn domains(supervisor: &SupervisorThread) -> Answered {
     let Some(observer) = supervisor.observer() else {
         return Ok((Answer::Tool(ToolAnswer::Domains(Vec::new())), Vec::new()));
     };
-    let names = supervisor.with(places).map_err(|error| refusal(&error))?;
+    let names = supervisor.act(places).map_err(|error| refusal(&error))?;
     let snapshot = observer.snapshot(CYCLE).map_err(|error| Refusal::Failed(error.to_string()))?;
-    let is_ring = supervisor.with(|engine| engine.interfaces()[1].is_some()).unwrap_or(false);
+    let is_ring = supervisor.act(|engine| engine.interfaces()[1].is_some()).unwrap_or(false);
     let lines = (0..).map(DomainId).zip(&snapshot.domains);
     let lines = lines.map(|(id, domain)| domain_line(id, domain, &observer, &names, is_ring)).collect();
     let images = snapshot.domains.iter().flat_map(|domain| domain.image.iter().copied()).collect();

@@ -16,7 +16,7 @@ const CYCLE: Duration = Duration::from_millis(200);
 
 /// The master as a whole.
 pub(super) fn report(supervisor: &SupervisorThread) -> Result<MasterReport, Error> {
-    let mut report = supervisor.with(of_engine)?;
+    let mut report = supervisor.act(of_engine)?;
     for (link, line) in Link::ALL.into_iter().zip(&mut report.links) {
         line.traffic = traffic(&supervisor.link_figures(link));
     }

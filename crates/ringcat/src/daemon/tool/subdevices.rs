@@ -27,7 +27,7 @@ const WRITTEN: u8 = 0x04;
 
 /// SubDevices from a position on, with their AL states.
 pub(super) fn list(supervisor: &SupervisorThread, from: u16) -> Result<Piece<SubDeviceLine>, Error> {
-    let (total, stations, mut these) = supervisor.with(move |engine| known(engine, from))?;
+    let (total, stations, mut these) = supervisor.act(move |engine| known(engine, from))?;
     if these.is_empty() {
         return Ok(Piece { total, these });
     }
@@ -110,7 +110,7 @@ fn identity(info: &SubDeviceInfo) -> [u32; 4] {
     [identity.vendor_id, identity.product_code, identity.revision, identity.serial]
 }
 
-/// The MainDevice writes a SyncManager: by its type, and by its control byte where the type does not tell.
+/// The MainDevice writes a SyncManager: by its type, and by its control byte where the type is not enough.
 fn is_output(kind: SyncManagerKind, control: u8) -> bool {
     match kind {
         SyncManagerKind::Outputs | SyncManagerKind::MailboxOut => true,

@@ -137,7 +137,7 @@ fn see(world: &mut World, fault: Fault, moment: u32, state: RingState) -> ringca
 
 fn edges() -> bool {
     let mut figures = Figures::new("edges of a ring of 16, 1 ms, detection 10 us, 17 cables, 10 moments of the cycle");
-    let (mut told, mut placed, mut fixed, mut quiet, mut double) = (0.0_f64, 0.0_f64, 0.0_f64, 0, (0, 0.0_f64));
+    let (mut reports, mut placed, mut fixed, mut quiet, mut double) = (0.0_f64, 0.0_f64, 0.0_f64, 0, (0, 0.0_f64));
     for cable in 0..=16 {
         let mut world = World::in_op(0, ring_of_16(FAST));
         world.application_mut().links_mut().measure_flights();
@@ -147,7 +147,7 @@ fn edges() -> bool {
             world.run_cycles(400);
             let mark = world.mark();
             let seen = see(&mut world, Fault::Cut(CableId(cable)), moment, RingState::Open);
-            told = told.max(after(&world, mark, seen, |event| matches!(event, Event::RingOpened { .. })));
+            reports = reports.max(after(&world, mark, seen, |event| matches!(event, Event::RingOpened { .. })));
             placed = placed.max(after(&world, mark, seen, |event| matches!(event, Event::BreakLocated { .. })));
             let healing = world.mark();
             let seen = see(&mut world, Fault::Heal(CableId(cable)), moment, RingState::Closed);
@@ -174,7 +174,7 @@ fn edges() -> bool {
         double.0 = double.0.max(world.incomplete(healing));
         assert!(ring_events(world.events(mark)).len() >= 3);
     }
-    figures.at_most("from the first frame that shows a break to the event", told, 1.0, "cycles");
+    figures.at_most("from the first frame that shows a break to the event", reports, 1.0, "cycles");
     figures.at_most("from there to its place", placed, 5.0, "cycles");
     figures.at_most("incomplete cycles of edges with no copy under way", f64::from(quiet as u32), 0.0, "cycles");
     figures.show("from the first frame on the original path to the event", format!("{fixed:.2} cycles"));

@@ -16,9 +16,9 @@ fn scanned(file: &EniFile, mut network: Network, cut: Option<CableId>) -> (Scan,
     }
     let mut main_device = MainDevice::request(SimulatedSegment::new(network), &Options::default());
     let scan = main_device.scan().expect("a scan");
-    let told = file.compare_cables(&scan.subdevices, &scan.topology);
-    assert!(told.iter().all(|difference| !difference.prevents_op));
-    (scan, told.iter().map(ToString::to_string).collect())
+    let reports = file.compare_cables(&scan.subdevices, &scan.topology);
+    assert!(reports.iter().all(|difference| !difference.prevents_op));
+    (scan, reports.iter().map(ToString::to_string).collect())
 }
 
 // covers: 8.2, eni-image
@@ -30,9 +30,9 @@ fn cables_as_in_the_file_are_not_reported_even_in_an_open_ring() {
     // The ring includes coupler and drive; the terminals are connected to the coupler, and are absent without their
     // cable.
     for (cable, there) in [(0, 5), (1, 2), (2, 3), (3, 4), (4, 5), (5, 5)] {
-        let (scan, told) = scanned(&file, file.simulated(true).expect("a segment"), Some(CableId(cable)));
+        let (scan, reports) = scanned(&file, file.simulated(true).expect("a segment"), Some(CableId(cable)));
         assert_eq!(scan.subdevices.len(), there, "cable {cable}");
-        assert_eq!(told, [""; 0], "cable {cable}");
+        assert_eq!(reports, [""; 0], "cable {cable}");
     }
 }
 
@@ -42,9 +42,9 @@ fn a_moved_cable_is_reported_with_both_places() {
     let file = machine();
     let mut moved = segment(&file.eni, &file.configuration, false);
     moved.cables[DRIVE].a = Endpoint::Device(DeviceIndex(BUTTONS), Port::B);
-    let (scan, told) = scanned(&file, Network::from_description(moved).expect("cables fit"), None);
+    let (scan, reports) = scanned(&file, Network::from_description(moved).expect("cables fit"), None);
     assert!(file.compare(&scan.subdevices).is_empty(), "all are there, in their order");
     let expected =
         "\"Drive (1005)\" is plugged into port B of \"Buttons (1004)\"; the file says port C of \"Coupler (1001)\"";
-    assert_eq!(told, [expected]);
+    assert_eq!(reports, [expected]);
 }

@@ -1,5 +1,5 @@
 //! Commands of a file beside the way to OP: on ways to INIT, at states that are requested again, for the whole bus, of
-//! SoE and AoE. Judged by what the SubDevices have served, in which state, and by their registers.
+//! SoE and AoE. Evaluated by what the SubDevices have served, in which state, and by their registers.
 
 use ringcat::{Event, SubDeviceId};
 use ringcat_sim::application::ServedMail;

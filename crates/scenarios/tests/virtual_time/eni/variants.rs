@@ -107,11 +107,11 @@ fn a_refused_object_is_reported_with_the_comment_of_the_file() {
     let network = Network::from_description(segment).expect("cables fit");
     let mut plant = activate_on(network, file, false).expect("it fits");
     plant.run(300);
-    let told = |event: &Event| {
+    let reports = |event: &Event| {
         matches!(event, Event::ConfigurationFailed { subdevice: SubDeviceId(DRIVE), reason }
             if reason.starts_with("start-up command 14 (PREOP to SAFEOP) \"velocity mode\": SDO 0x6060:00: aborted"))
     };
-    assert!(plant.events.iter().any(told), "{:?}", plant.events);
+    assert!(plant.events.iter().any(reports), "{:?}", plant.events);
     set(&mut plant, "Lamps.Channel 1", 1);
     plant.run(4);
     assert_eq!(plant.device(LAMPS).outputs(), [1], "the others work");
@@ -144,8 +144,8 @@ fn a_local_ring_is_declared_by_station_addresses_between_load_and_apply() {
         plant.events.clear();
         fault(plant.network_mut(), CableId(2));
         plant.run(200);
-        let told = |event: &&Event| matches!(event, Event::JunctionChanged { broken: now, .. } if *now == broken);
-        assert_eq!(plant.events.iter().filter(told).count(), 1, "{:?}", plant.events);
+        let reports = |event: &&Event| matches!(event, Event::JunctionChanged { broken: now, .. } if *now == broken);
+        assert_eq!(plant.events.iter().filter(reports).count(), 1, "{:?}", plant.events);
         assert!(plant.is_complete() && plant.application.all_settled());
     }
 }
@@ -220,11 +220,11 @@ fn registers_checked_by_a_file_are_set_by_the_simulated_eeprom() {
     // Values of another controller type are not adopted.
     let mut plant = activate(with_commands_of_the_drive(&check(0x0000, "9900", "")), false, false).unwrap();
     plant.run(300);
-    let told = |event: &Event| {
+    let reports = |event: &Event| {
         matches!(event, Event::ConfigurationFailed { subdevice: SubDeviceId(DRIVE), reason }
             if reason.contains("\"check 0\": register 0x0000: expected 99 00 within 10 ms, got 11 00"))
     };
-    assert!(plant.events.iter().any(told), "{:?}", plant.events);
+    assert!(plant.events.iter().any(reports), "{:?}", plant.events);
 }
 
 // covers: eni-run

@@ -56,15 +56,15 @@ fn pdos_of_the_dictionary_replace_those_of_the_sii_in_preop() {
 // covers: states, odd-sii, 6.3
 #[test]
 fn a_dictionary_with_a_part_of_the_pdos_replaces_nothing() {
-    for (left_out, is_told) in
+    for (left_out, is_reported) in
         [(vec![0x1C12], true), (vec![0x1C13], true), (vec![0x1A00], true), (vec![0x1C12, 0x1C13], false)]
     {
         let device = DeviceDescription { left_out: left_out.clone(), ..drive_with_another_sii() };
         let mut main_device = idle_with(vec![device], &options());
         assert_eq!(bits(&main_device.subdevices()[0]), OF_SII, "{left_out:x?}");
         let is_it = |what: &str| what.contains("cannot be read");
-        let told = |timed: &TimedEvent| matches!(&timed.event, Event::SiiOddity { what, .. } if is_it(what));
-        assert_eq!(events(&mut main_device).iter().any(told), is_told, "{left_out:x?}");
+        let reports = |timed: &TimedEvent| matches!(&timed.event, Event::SiiOddity { what, .. } if is_it(what));
+        assert_eq!(events(&mut main_device).iter().any(reports), is_reported, "{left_out:x?}");
         main_device.attend(Duration::from_secs(3));
         assert!(events(&mut main_device).is_empty(), "it is said once");
         assert_eq!(statuses(&mut main_device), [PREOP]);

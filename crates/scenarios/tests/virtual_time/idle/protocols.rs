@@ -10,7 +10,7 @@ use super::*;
 const KINDS: [&str; 3] = ["coupler", "all-protocols", "servo"];
 const SPEAKER: Position = Position(1);
 
-fn idle_speaker(is_ring: bool) -> MainDevice<Tap> {
+fn idle_mailbox_device(is_ring: bool) -> MainDevice<Tap> {
     let network = if is_ring { ring } else { line };
     let network = network(descriptions(&KINDS), NetworkOptions::default());
     let mut main_device = MainDevice::request(Tap::new(network), &options());
@@ -27,7 +27,7 @@ fn route() -> AoeRoute {
 #[test]
 fn every_service_answers_by_ring_position_in_idle_operation() {
     for is_ring in [false, true] {
-        let mut main_device = idle_speaker(is_ring);
+        let mut main_device = idle_mailbox_device(is_ring);
         assert_eq!(main_device.subdevice(SPEAKER).sdo_read::<u32>(0x1018, 1).expect("SDO"), 0x0C47);
         let objects = main_device.subdevice(SPEAKER).sdo_info().expect("SDO information");
         assert!(objects.contains(&0x1018), "{objects:x?}");

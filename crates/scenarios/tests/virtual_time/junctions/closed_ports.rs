@@ -12,7 +12,7 @@ use ringcat_wire::register::{DlStatus, LoopControl, map};
 use scenarios::world::{CYCLE, World};
 
 use super::second_breaks::{ends_of_two, two_rings};
-use super::{change, in_op, told};
+use super::{change, in_op, reports};
 
 /// One register controls all ports of a junction: a port that the application had closed stays closed.
 // covers: 2.2, junctions
@@ -48,7 +48,7 @@ fn a_port_closed_on_purpose_stays_closed_while_rings_are_examined() {
             change(Some(near), far, broken, breaks)
         };
         let blocked = |blocked, breaks| Event::JunctionsBlocked { blocked, breaks };
-        assert_eq!(told(&world, mark), [blocked(true, 0), place(2, true, 1), place(6, true, 2)]);
+        assert_eq!(reports(&world, mark), [blocked(true, 0), place(2, true, 1), place(6, true, 2)]);
         world.heal(CableId(6));
         stays_closed(&mut world, 1_500);
         world.heal(CableId(2));

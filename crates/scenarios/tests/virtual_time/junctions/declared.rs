@@ -10,7 +10,7 @@ use scenarios::segments::{MAIN, REDUNDANT, RING_OF_THREE, TWO_RINGS, at, wired};
 use scenarios::world::{CYCLE, World};
 
 use super::plans::Plan;
-use super::{ONE, STRICT, changed, edge, in_op, one_ring, told};
+use super::{ONE, STRICT, changed, edge, in_op, one_ring, reports};
 
 fn connection((head, tail, tail_port): (usize, usize, u8)) -> JunctionConnection {
     JunctionConnection::new(SubDeviceId(head), 1, SubDeviceId(tail), tail_port)
@@ -51,9 +51,9 @@ fn a_wrong_declared_closing_cable_is_refused_closed_and_broken() {
         assert_eq!(refused(21, network, &[STRICT]), None, "cable {broken}");
     }
     let mut world = in_op(22, one_ring(), (JunctionMode::Strict, &[STRICT]));
-    assert_eq!(told(&world, world.beginning()), [], "a test is not reported as a break");
+    assert_eq!(reports(&world, world.beginning()), [], "a test is not reported as a break");
     let mark = edge(&mut world, "cut", |world| world.cut(CableId(3)));
-    assert_eq!(told(&world, mark), [changed(3, true)]);
+    assert_eq!(reports(&world, mark), [changed(3, true)]);
 }
 
 // covers: JR-05, JR-06, junctions

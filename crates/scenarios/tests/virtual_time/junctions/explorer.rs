@@ -31,7 +31,7 @@ struct Run {
     is_known: bool,
     looking: Option<Pending<Result<ringcat::Rescan, ringcat::ServiceError>>>,
     /// The broken cable was reported while the cabling was known.
-    was_told: bool,
+    was_reported: bool,
     mark: Mark,
 }
 
@@ -57,9 +57,9 @@ impl Run {
         };
         let (one, other) = self.plan.cables[cable];
         let ends = [end(one), end(other)];
-        let told = self.ends(event);
+        let reports = self.ends(event);
         matches!(event, Event::JunctionChanged { broken, .. } if *broken == is_broken)
-            && (told == ends || told == [ends[1], ends[0]])
+            && (reports == ends || reports == [ends[1], ends[0]])
     }
 
     fn cycles(&mut self, cycles: u64) {
@@ -127,7 +127,7 @@ impl Run {
         }
         self.cycles(200);
         self.is_settled = true;
-        let last = self.world.judged(self.mark).last().map(|judged| judged.delivery);
+        let last = self.world.evaluated(self.mark).last().map(|evaluated| evaluated.delivery);
         assert!(matches!(last, Some(Delivery::Complete | Delivery::WithoutAbsent)), "{last:?}");
     }
 
@@ -136,11 +136,11 @@ impl Run {
             let mark = self.world.mark();
             self.world.heal(CableId(cable));
             self.cycles(150);
-            let told = self.changes(mark);
+            let reports = self.changes(mark);
             let is_local = self.plan.local.contains(&cable);
-            if is_local && self.was_told && self.is_settled {
-                assert_eq!(told.len(), 1, "cable {cable}");
-                assert!(!self.is_known || self.is_of(&told[0], cable, false), "cable {cable}: {told:?}");
+            if is_local && self.was_reported && self.is_settled {
+                assert_eq!(reports.len(), 1, "cable {cable}");
+                assert!(!self.is_known || self.is_of(&reports[0], cable, false), "cable {cable}: {reports:?}");
             }
             return;
         }
@@ -157,12 +157,12 @@ impl Run {
         let mark = self.world.mark();
         self.world.cut(CableId(cable));
         self.cycles(60);
-        let told = self.changes(mark);
+        let reports = self.changes(mark);
         let is_local = self.plan.local.contains(&cable);
-        assert!(told.len() <= usize::from(is_local) || !self.is_settled, "cable {cable}: {told:?}");
-        self.was_told = told.iter().any(|event| matches!(event, Event::JunctionChanged { broken: true, .. }));
+        assert!(reports.len() <= usize::from(is_local) || !self.is_settled, "cable {cable}: {reports:?}");
+        self.was_reported = reports.iter().any(|event| matches!(event, Event::JunctionChanged { broken: true, .. }));
         if is_exact && is_local {
-            assert!(self.was_told && self.is_of(&told[0], cable, true), "cable {cable}: {told:?}");
+            assert!(self.was_reported && self.is_of(&reports[0], cable, true), "cable {cable}: {reports:?}");
         }
     }
 
@@ -194,10 +194,10 @@ impl Run {
             }
         }
         self.cycles(100);
-        let told = self.changes(mark);
+        let reports = self.changes(mark);
         let is_broken = |event: &&Event| matches!(event, Event::JunctionChanged { broken: true, .. });
-        let broken = told.iter().filter(is_broken).count();
-        assert!(broken <= 1 && told.len() == 2 * broken, "cable {cable}: {told:?}");
+        let broken = reports.iter().filter(is_broken).count();
+        assert!(broken <= 1 && reports.len() == 2 * broken, "cable {cable}: {reports:?}");
     }
 
     /// More breaks than tolerated: two cables of local rings. Both are reported, with their places if the cabling is
@@ -215,10 +215,10 @@ impl Run {
         self.world.cut(CableId(one));
         self.world.fault_in(apart, Fault::Cut(CableId(other)));
         self.cycles(400);
-        let told = self.changes(mark);
+        let reports = self.changes(mark);
         for cable in [one, other] {
-            let is_told = told.iter().filter(|event| self.is_of(event, cable, true)).count();
-            assert_eq!(is_told, 1, "cables {one} and {other}: {told:?}");
+            let is_reported = reports.iter().filter(|event| self.is_of(event, cable, true)).count();
+            assert_eq!(is_reported, 1, "cables {one} and {other}: {reports:?}");
         }
         let crossed = |event: &Event| matches!(event, Event::LineCrossed { .. } | Event::JunctionUnknown { .. });
         self.world.heal(CableId(other));
@@ -226,13 +226,13 @@ impl Run {
         self.cycles(pause);
         self.world.heal(CableId(one));
         self.world.until(2 * LIMIT, "all back", |world| {
-            let last = world.judged(mark).last().map(|judged| judged.delivery);
+            let last = world.evaluated(mark).last().map(|evaluated| evaluated.delivery);
             let is_well = matches!(last, Some(Delivery::Complete | Delivery::WithoutAbsent));
             is_well && world.application().all_settled()
         });
         self.settle();
-        let told = self.changes(mark);
-        assert!(matches!(told.last(), Some(Event::JunctionChanged { broken: false, breaks: 0, .. })), "{told:?}");
+        let reports = self.changes(mark);
+        assert!(matches!(reports.last(), Some(Event::JunctionChanged { broken: false, breaks: 0, .. })), "{reports:?}");
         assert!(!self.world.saw(mark, crossed), "cables {one} and {other}");
         self.mark = self.world.mark();
     }
@@ -285,7 +285,7 @@ fn run(seed: u64) {
     world.until(LIMIT, "all that are there settled", |world| world.application().all_settled());
     world.recognise();
     // Joining SubDevices latch former outputs.
-    world.judge_latched(false);
+    world.evaluate_latched(false);
     world.run_cycles(60);
     let mark = world.mark();
     // While the group is absent its ring is broken at its place.
@@ -299,7 +299,7 @@ fn run(seed: u64) {
         is_known,
         is_settled: true,
         looking: None,
-        was_told: false,
+        was_reported: false,
         mark,
     };
     for _ in 0..12 {
@@ -324,9 +324,9 @@ fn run(seed: u64) {
             let mark = run.world.mark();
             run.world.fault(if broken { Fault::Cut(CableId(cable)) } else { Fault::Heal(CableId(cable)) });
             run.cycles(100);
-            let told = run.changes(mark);
-            assert!(told.len() == 1 && run.is_of(&told[0], cable, broken), "cable {cable}: {told:?}");
-            let Event::JunctionChanged { breaks, .. } = told[0] else { unreachable!() };
+            let reports = run.changes(mark);
+            assert!(reports.len() == 1 && run.is_of(&reports[0], cable, broken), "cable {cable}: {reports:?}");
+            let Event::JunctionChanged { breaks, .. } = reports[0] else { unreachable!() };
             assert_eq!(breaks, usize::from(broken), "cable {cable}");
         }
     }

@@ -17,7 +17,7 @@ use ringcat_sim::network::Network;
 use scenarios::segments::{MAIN, REDUNDANT, at, descriptions, wired_with};
 use scenarios::world::{CYCLE, Mark, World};
 
-use super::{Setting, change, crossed, edge, told};
+use super::{Setting, change, crossed, edge, reports};
 use crate::hot_connect::{LIMIT, TOOL, group, infos, tool};
 
 /// Permanent SubDevices: the second is the junction, the fourth the tail of its ring.
@@ -114,10 +114,10 @@ fn a_group_behind_a_ring_member_joins_and_leaves_closed_and_broken() {
             let mark = world.mark();
             world.heal(PLUG);
             until_joined(&mut world);
-            assert_eq!(told(&world, mark), [], "{what}");
+            assert_eq!(reports(&world, mark), [], "{what}");
             world.cut(PLUG);
             until_left(&mut world);
-            assert_eq!((told(&world, mark), crossed(&world, mark)), (vec![], 0), "{what}");
+            assert_eq!((reports(&world, mark), crossed(&world, mark)), (vec![], 0), "{what}");
             // It also stays while the ring breaks and is repaired.
             world.heal(PLUG);
             until_joined(&mut world);
@@ -228,14 +228,14 @@ fn a_group_in_a_local_ring_is_part_of_it_only_while_present() {
         for round in 0..2 {
             let mark = world.mark();
             power_on_group(&mut world);
-            assert_eq!(told(&world, mark).len(), 1, "{what}: the gap is closed");
+            assert_eq!(reports(&world, mark).len(), 1, "{what}: the gap is closed");
             look(&mut world, &WITH_GROUP);
             for cable in [2, 3, 4, 5, 6] {
                 for broken in [true, false] {
                     let fault = if broken { Fault::Cut } else { Fault::Heal };
                     let mark = edge(&mut world, &what, |world| world.fault(fault(CableId(cable))));
                     let expected = vec![own_with_group(cable, broken)];
-                    assert_eq!((told(&world, mark), crossed(&world, mark)), (expected, 0), "{what}, cable {cable}");
+                    assert_eq!((reports(&world, mark), crossed(&world, mark)), (expected, 0), "{what}, cable {cable}");
                     assert!(names_fit(&world, mark), "{what}, cable {cable}");
                 }
             }
@@ -254,19 +254,19 @@ fn a_group_in_a_local_ring_is_part_of_it_only_while_present() {
                 let Event::JunctionChanged { near, far, .. } = own_with_group(5, true) else { unreachable!() };
                 change(near, far, true, 2)
             }];
-            assert_eq!(told(&world, mark), ends, "{what}: both of its ends are open");
+            assert_eq!(reports(&world, mark), ends, "{what}: both of its ends are open");
             // The SubDevices behind the gap are known: the gap is one cable now.
             look(&mut world, &WITHOUT_GROUP);
             world.run_cycles(60);
-            assert_eq!(told(&world, mark).len(), 2, "{what}: as reported");
+            assert_eq!(reports(&world, mark).len(), 2, "{what}: as reported");
             if round == 0 && !follow {
                 let mark = world.mark();
                 power_on_group(&mut world);
-                assert_eq!(told(&world, mark), [own((2, 1), (3, 0), false)], "{what}");
+                assert_eq!(reports(&world, mark), [own((2, 1), (3, 0), false)], "{what}");
                 world.power_off(GROUP[1]);
                 world.power_off(GROUP[0]);
                 until_left(&mut world);
-                assert_eq!(told(&world, mark)[1..], [own((2, 1), (3, 0), true)], "{what}");
+                assert_eq!(reports(&world, mark)[1..], [own((2, 1), (3, 0), true)], "{what}");
             }
         }
         others_stay(&world, &what);
@@ -290,12 +290,12 @@ fn a_break_during_the_join_of_a_group_is_reported_once() {
         let rescan = world.finish(2 * LIMIT, pending).expect("it holds still");
         assert!(rescan.is_complete() && rescan.subdevices.len() == 7, "{what}");
         world.run_cycles(100);
-        let broken = told(&world, mark);
+        let broken = reports(&world, mark);
         assert!(matches!(broken[..], [Event::JunctionChanged { broken: true, breaks: 1, .. }]), "{what}: {broken:?}");
         let mark = edge(&mut world, &what, |world| world.heal(CableId(cable)));
-        assert_eq!(told(&world, mark), [own_with_group(cable, false)], "{what}");
+        assert_eq!(reports(&world, mark), [own_with_group(cable, false)], "{what}");
         let mark = edge(&mut world, &what, |world| world.cut(CableId(cable)));
-        assert_eq!((told(&world, mark), crossed(&world, mark)), (vec![own_with_group(cable, true)], 0), "{what}");
+        assert_eq!((reports(&world, mark), crossed(&world, mark)), (vec![own_with_group(cable, true)], 0), "{what}");
         others_stay(&world, &what);
     }
 }
@@ -322,11 +322,15 @@ fn a_group_that_left_a_broken_ring_is_no_longer_part_of_it() {
         assert_eq!(rescan(&mut world), WITHOUT_GROUP, "{what}");
         let mark = world.mark();
         power_on_group(&mut world);
-        assert_eq!(told(&world, mark), [own((2, 1), (3, 0), false)], "{what}");
+        assert_eq!(reports(&world, mark), [own((2, 1), (3, 0), false)], "{what}");
         assert_eq!(rescan(&mut world), WITH_GROUP, "{what}");
         for cable in [3, 4, 5] {
             let mark = edge(&mut world, &what, |world| world.cut(CableId(cable)));
-            assert_eq!((told(&world, mark), crossed(&world, mark)), (vec![own_with_group(cable, true)], 0), "{what}");
+            assert_eq!(
+                (reports(&world, mark), crossed(&world, mark)),
+                (vec![own_with_group(cable, true)], 0),
+                "{what}"
+            );
             edge(&mut world, &what, |world| world.heal(CableId(cable)));
         }
     }
@@ -340,7 +344,7 @@ fn a_group_in_a_local_ring_joins_and_leaves_without_a_rescan() {
         let what = format!("{setting:?}, two links: {two_links}");
         let changes = |world: &World, mark| -> Vec<bool> {
             let is = |event: &Event| matches!(event, Event::JunctionChanged { broken: true, .. });
-            told(world, mark).iter().map(is).collect()
+            reports(world, mark).iter().map(is).collect()
         };
         assert_eq!(changes(&world, world.beginning()), [true], "{what}");
         for _ in 0..2 {
@@ -363,13 +367,13 @@ fn a_group_in_a_local_ring_joins_and_leaves_without_a_rescan() {
                         4 => vec![],
                         _ => vec![own((3, 1), (1, 1), broken)],
                     };
-                    assert_eq!(told(&world, mark), expected, "{what}, cable {cable}");
+                    assert_eq!(reports(&world, mark), expected, "{what}, cable {cable}");
                 }
             }
             let mark = world.mark();
             GROUP.iter().rev().for_each(|device| world.power_off(*device));
             until_left(&mut world);
-            assert_eq!(told(&world, mark), [own((2, 1), (3, 0), true)], "{what}");
+            assert_eq!(reports(&world, mark), [own((2, 1), (3, 0), true)], "{what}");
             others_stay(&world, &what);
         }
     }

@@ -9,7 +9,7 @@ use ringcat_sim::frame::Port::{A, B, C, D};
 use scenarios::segments::{MAIN, REDUNDANT, at, wired};
 use scenarios::world::World;
 
-use super::{STRICT, crossed, edge, in_op, one_ring, told};
+use super::{STRICT, crossed, edge, in_op, one_ring, reports};
 
 /// Junction 0 has a ring with two more junctions, 1 and 3, with a ring each, and behind it another junction, 5.
 const KINDS: [&str; 8] = [
@@ -64,11 +64,11 @@ fn four_nested_rings_are_learned_closed_and_with_any_one_broken() {
             let mut learned: Vec<Closing> = learned.collect();
             learned.sort_unstable();
             assert_eq!(learned, all, "{what}");
-            assert_eq!(told(&world, world.beginning()).len(), usize::from(broken.is_some()), "{what}");
+            assert_eq!(reports(&world, world.beginning()).len(), usize::from(broken.is_some()), "{what}");
             assert_eq!(crossed(&world, world.beginning()), 0, "{what}");
             if let Some(cable) = broken {
                 let mark = edge(&mut world, &what, |world| world.heal(CableId(cable)));
-                assert_eq!(told(&world, mark).len(), 1, "{what}");
+                assert_eq!(reports(&world, mark).len(), 1, "{what}");
             }
         }
     }
@@ -95,10 +95,10 @@ fn a_local_cable_broken_at_the_scan_is_listed_after_its_repair() {
         // Errors are counted for it as for any other cable.
         world.corrupt(CableId(broken), 30);
         world.run_cycles(1_600);
-        let told = |timed: &&ringcat::TimedEvent| {
+        let reports = |timed: &&ringcat::TimedEvent| {
             matches!(timed.event, Event::CableErrors { cable, .. }
             if cable == whole[broken])
         };
-        assert_eq!(world.events(world.beginning()).iter().filter(told).count(), 1, "{what}");
+        assert_eq!(world.events(world.beginning()).iter().filter(reports).count(), 1, "{what}");
     }
 }

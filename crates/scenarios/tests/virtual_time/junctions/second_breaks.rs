@@ -14,7 +14,7 @@ use scenarios::check::{Delivery, troubles};
 use scenarios::segments::{MAIN, REDUNDANT, RING_IN_RING, TWO_RINGS, at, wired};
 use scenarios::world::{CYCLE, World};
 
-use super::{STRICT, change, crossed, edge, ends, in_op, one_ring, told, without_names};
+use super::{STRICT, change, crossed, edge, ends, in_op, one_ring, reports, without_names};
 
 /// Devices of [`TWO_RINGS`].
 const KINDS: [&str; 7] =
@@ -37,9 +37,9 @@ fn either_of_two_rings_may_break_and_a_second_break_is_reported() {
         for cable in [1, 2, 3, 5, 6, 7] {
             let what = format!("{setting:?}, cable {cable}");
             let mark = edge(&mut world, &what, |world| world.cut(CableId(cable)));
-            assert_eq!(told(&world, mark).len(), 1, "{what}");
+            assert_eq!(reports(&world, mark).len(), 1, "{what}");
             let mark = edge(&mut world, &what, |world| world.heal(CableId(cable)));
-            assert_eq!(told(&world, mark).len(), 1, "{what}");
+            assert_eq!(reports(&world, mark).len(), 1, "{what}");
         }
         // The second ring breaks too: frames are destroyed at the second unconnected port 0.
         edge(&mut world, "first break", |world| world.cut(CableId(2)));
@@ -50,17 +50,17 @@ fn either_of_two_rings_may_break_and_a_second_break_is_reported() {
             let (near, far) = (Some(PortOf::new(Position(4), 1)), PortOf::new(Position(5), 0));
             change(near, far, broken, breaks)
         };
-        assert_eq!(told(&world, mark), [Event::JunctionsBlocked { blocked: true, breaks: 1 }, second(true, 2)]);
-        assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Zero));
+        assert_eq!(reports(&world, mark), [Event::JunctionsBlocked { blocked: true, breaks: 1 }, second(true, 2)]);
+        assert_eq!(world.evaluated(mark).last().map(|evaluated| evaluated.delivery), Some(Delivery::Zero));
         assert!(!world.saw(mark, |event| matches!(event, Event::Lost { .. })), "the present SubDevices are unknown");
         // One of them is repaired: all SubDevices come back, the other ring is still broken.
         world.heal(CableId(6));
         world.until(Duration::from_secs(3), "all in OP", |w| w.all_in_op() && w.application().all_settled());
         world.run_cycles(100);
         let free = Event::JunctionsBlocked { blocked: false, breaks: 2 };
-        assert_eq!(told(&world, mark)[2..], [free, second(false, 1)]);
+        assert_eq!(reports(&world, mark)[2..], [free, second(false, 1)]);
         let mark = edge(&mut world, "first break healed", |world| world.heal(CableId(2)));
-        assert!(matches!(told(&world, mark)[..], [Event::JunctionChanged { broken: false, breaks: 0, .. }]));
+        assert!(matches!(reports(&world, mark)[..], [Event::JunctionChanged { broken: false, breaks: 0, .. }]));
     }
 }
 
@@ -89,12 +89,12 @@ fn two_rings_that_break_at_once_are_reported_with_both_places() {
         world.fault_in(CYCLE / 2, Fault::Cut(CableId(first)));
         world.fault_in(CYCLE / 2 + apart[number % apart.len()], Fault::Cut(CableId(second)));
         world.run_cycles(300);
-        let what = format!("cables {first} and {second}: {:?}", told(&world, mark));
+        let what = format!("cables {first} and {second}: {:?}", reports(&world, mark));
         // The closing cable leaves no port 0 unconnected: it does not block frames.
         let closing = [first, second].iter().filter(|cable| [3, 7].contains(*cable)).count();
         if closing > 0 {
             let broken = |event: &Event| matches!(event, Event::JunctionChanged { broken: true, .. });
-            assert!(told(&world, mark).iter().filter(|event| broken(event)).count() == 2, "{what}");
+            assert!(reports(&world, mark).iter().filter(|event| broken(event)).count() == 2, "{what}");
             assert_eq!(troubles(world.events(mark)), Vec::<&Event>::new(), "{what}");
         } else {
             let place = |cable: usize, broken, breaks| {
@@ -103,14 +103,18 @@ fn two_rings_that_break_at_once_are_reported_with_both_places() {
             };
             let (one, other) = (first.min(second), first.max(second));
             let blocked = |blocked, breaks| Event::JunctionsBlocked { blocked, breaks };
-            assert_eq!(told(&world, mark), [blocked(true, 0), place(one, true, 1), place(other, true, 2)], "{what}");
-            assert_eq!(world.judged(mark).last().map(|judged| judged.delivery), Some(Delivery::Zero), "{what}");
+            assert_eq!(reports(&world, mark), [blocked(true, 0), place(one, true, 1), place(other, true, 2)], "{what}");
+            assert_eq!(
+                world.evaluated(mark).last().map(|evaluated| evaluated.delivery),
+                Some(Delivery::Zero),
+                "{what}"
+            );
             let lost = |event: &Event| matches!(event, Event::Lost { .. } | Event::LineCrossed { .. });
             assert!(!world.saw(mark, lost), "{what}: SubDevices that are unreachable on purpose are not lost");
             // The places are known before the watchdogs of outputs expire (100 ms).
-            let told_at =
+            let reported_at =
                 world.events(mark).iter().filter(|timed| without_names(timed.event.clone()) == place(other, true, 2));
-            let at = told_at.map(|timed| timed.at).next().expect("it was told");
+            let at = reported_at.map(|timed| timed.at).next().expect("it was reported");
             let begin = world.events(mark)[0].at;
             println!("{first} and {second}: both placed {:?} after the first event", at.since(begin));
             assert!(at.since(begin) < Duration::from_millis(100), "{what}");
@@ -118,13 +122,16 @@ fn two_rings_that_break_at_once_are_reported_with_both_places() {
             world.heal(CableId(first));
             world.until(Duration::from_secs(3), "all in OP", |w| w.all_in_op() && w.application().all_settled());
             world.run_cycles(100);
-            assert_eq!(told(&world, mending), [blocked(false, 2), place(first, false, 1)], "{what}");
+            assert_eq!(reports(&world, mending), [blocked(false, 2), place(first, false, 1)], "{what}");
         }
         if closing > 0 {
             edge(&mut world, &what, |world| world.heal(CableId(first)));
         }
         let mark = edge(&mut world, &what, |world| world.heal(CableId(second)));
-        assert!(matches!(told(&world, mark)[..], [Event::JunctionChanged { broken: false, breaks: 0, .. }]), "{what}");
+        assert!(
+            matches!(reports(&world, mark)[..], [Event::JunctionChanged { broken: false, breaks: 0, .. }]),
+            "{what}"
+        );
     }
 }
 
@@ -144,12 +151,12 @@ fn two_local_rings_broken_in_a_ring_of_two_links_have_their_places() {
         change(Some(near), far, broken, breaks)
     };
     let blocked = |blocked, breaks| Event::JunctionsBlocked { blocked, breaks };
-    assert_eq!(told(&world, mark), [blocked(true, 0), place(2, true, 1), place(6, true, 2)]);
+    assert_eq!(reports(&world, mark), [blocked(true, 0), place(2, true, 1), place(6, true, 2)]);
     assert!(!world.saw(mark, |event| matches!(event, Event::Lost { .. })));
     world.heal(CableId(6));
     world.until(Duration::from_secs(3), "all in OP", |w| w.all_in_op() && w.application().all_settled());
     world.run_cycles(100);
-    assert_eq!(told(&world, mark)[3..], [blocked(false, 2), place(6, false, 1)]);
+    assert_eq!(reports(&world, mark)[3..], [blocked(false, 2), place(6, false, 1)]);
     edge(&mut world, "the other one", |world| world.heal(CableId(2)));
 }
 
@@ -189,21 +196,21 @@ fn nested_rings_that_break_at_once_are_reported_with_both_places() {
         world.cut(CableId(inner));
         world.cut(CableId(outer));
         world.run_cycles(1_500);
-        let what = format!("cables {inner} and {outer}: {:?}", told(&world, mark));
+        let what = format!("cables {inner} and {outer}: {:?}", reports(&world, mark));
         let begin = world.events(mark)[0].at;
         let placed = |timed: &&ringcat::TimedEvent| matches!(timed.event, Event::JunctionChanged { .. });
         let at = world.events(mark).iter().rfind(placed).map(|timed| timed.at.since(begin));
         assert!(at.is_some_and(|at| at < Duration::from_millis(100)), "{at:?} after the first event, {what}");
         let either = [[inner, outer], [outer, inner]]
             .map(|[one, other]| vec![blocked(true, 0), place(one, true, 1), place(other, true, 2)]);
-        assert!(either.contains(&told(&world, mark)), "{what}");
+        assert!(either.contains(&reports(&world, mark)), "{what}");
         assert!(!world.saw(mark, |event| matches!(event, Event::Lost { .. } | Event::LineCrossed { .. })), "{what}");
         let (first, second) = if number < 2 { (outer, inner) } else { (inner, outer) };
         let mark = world.mark();
         world.heal(CableId(first));
         world.until(Duration::from_secs(3), "all in OP", |w| w.all_in_op() && w.application().all_settled());
         world.run_cycles(100);
-        assert_eq!(told(&world, mark), [blocked(false, 2), place(first, false, 1)], "{what}");
+        assert_eq!(reports(&world, mark), [blocked(false, 2), place(first, false, 1)], "{what}");
         edge(&mut world, &what, |world| world.heal(CableId(second)));
     }
 }
@@ -220,14 +227,14 @@ fn two_breaks_in_one_ring_cut_off_only_the_part_between_them() {
     });
     world.run_cycles(200);
     let (near, far) = ends(4);
-    assert_eq!(told(&world, mark), [change(Some(near), far, true, 2)]);
-    assert_eq!(world.judged(mark).last().map(|judged| judged.stale.clone()), Some(vec![3]));
+    assert_eq!(reports(&world, mark), [change(Some(near), far, true, 2)]);
+    assert_eq!(world.evaluated(mark).last().map(|evaluated| evaluated.stale.clone()), Some(vec![3]));
     world.heal(CableId(3));
     world.until(Duration::from_secs(3), "all in OP", |world| world.all_in_op() && world.application().all_settled());
     edge(&mut world, "second repair", |world| world.heal(CableId(4)));
     let left: Vec<usize> = world.left_op(mark).iter().map(|device| device.0).collect();
     assert!(left.iter().all(|device| *device == 3), "{left:?}: the others continue");
-    assert!(matches!(told(&world, mark).last(), Some(Event::JunctionChanged { broken: false, breaks: 0, .. })));
+    assert!(matches!(reports(&world, mark).last(), Some(Event::JunctionChanged { broken: false, breaks: 0, .. })));
 }
 
 // covers: junctions
@@ -237,11 +244,11 @@ fn a_member_without_power_breaks_the_ring_at_both_ports_and_returns() {
     let mark = world.mark();
     world.power_off(DeviceIndex(3));
     world.run_cycles(100);
-    assert_eq!(told(&world, mark).len(), 2);
+    assert_eq!(reports(&world, mark).len(), 2);
     world.power_on(DeviceIndex(3));
     world.until(Duration::from_secs(5), "all in OP", |world| world.all_in_op() && world.application().all_settled());
     world.run_cycles(100);
-    assert_eq!(told(&world, mark).len(), 4);
+    assert_eq!(reports(&world, mark).len(), 4);
     assert!(world.left_op(mark).iter().all(|device| device.0 == 3));
 }
 
@@ -263,7 +270,7 @@ fn a_local_ring_in_a_ring_of_two_links_tolerates_any_one_break() {
             for heal in [false, true] {
                 let act = |world: &mut World| if heal { world.heal(CableId(cable)) } else { world.cut(CableId(cable)) };
                 let mark = edge(&mut world, &what, act);
-                assert_eq!(told(&world, mark).len(), usize::from(local), "{what}");
+                assert_eq!(reports(&world, mark).len(), usize::from(local), "{what}");
                 let opened = world.saw(mark, |event| matches!(event, Event::RingOpened { .. }));
                 assert_eq!(opened, !local && !heal, "{what}: the main ring has its own events");
             }
@@ -273,7 +280,7 @@ fn a_local_ring_in_a_ring_of_two_links_tolerates_any_one_break() {
         // too.
         edge(&mut world, "main ring behind the junction", |world| world.cut(CableId(5)));
         let mark = edge(&mut world, "local ring", |world| world.cut(CableId(3)));
-        assert_eq!(told(&world, mark).len(), 1);
+        assert_eq!(reports(&world, mark).len(), 1);
         edge(&mut world, "local ring whole", |world| world.heal(CableId(3)));
         edge(&mut world, "main ring whole", |world| world.heal(CableId(5)));
         // In the half of the redundant interface its frames are destroyed; the other half continues.
@@ -281,7 +288,7 @@ fn a_local_ring_in_a_ring_of_two_links_tolerates_any_one_break() {
         let mark = world.mark();
         world.cut(CableId(3));
         world.run_cycles(200);
-        assert!(world.judged(mark).last().is_some_and(|judged| !judged.stale.is_empty()));
+        assert!(world.evaluated(mark).last().is_some_and(|evaluated| !evaluated.stale.is_empty()));
         assert!(!world.left_op(mark).contains(&DeviceIndex(0)));
         world.heal(CableId(3));
         world.until(Duration::from_secs(5), "all in OP", |w| w.all_in_op() && w.application().all_settled());
@@ -310,12 +317,12 @@ fn a_broken_local_ring_is_no_crossed_line_for_enhanced_detection() {
                 world.fault(if broken { Fault::Cut(CableId(cable)) } else { Fault::Heal(CableId(cable)) });
                 world.run_cycles(200);
                 let what = format!("{mode:?}, cable {cable}, broken: {broken}");
-                assert_eq!((crossed(&world, mark), told(&world, mark).len()), (0, 1), "{what}");
+                assert_eq!((crossed(&world, mark), reports(&world, mark).len()), (0, 1), "{what}");
                 assert_eq!(world.left_op(mark), [], "{what}");
                 // The edge itself, the redundant link taken down, and brought up again.
                 assert!(world.incomplete(mark) <= 3, "{what}: {}", world.incomplete(mark));
                 let opened = |event: &Event| matches!(event, Event::RingOpened { .. });
-                assert!(!world.saw(mark, opened), "{what}: a controlled break is not told");
+                assert!(!world.saw(mark, opened), "{what}: a controlled break is not reported");
                 assert_eq!(world.application().ring(), ringcat::RingState::Closed, "{what}");
             }
         }
@@ -350,7 +357,7 @@ fn breaks_of_two_rings_during_a_controlled_break_are_located_too() {
         world.cut(CableId(2));
         world.cut(CableId(6));
         // The first one was reported as broken before, and not yet as mended.
-        let is_located = |world: &World| told(world, mark).contains(&place(6, 2));
+        let is_located = |world: &World| reports(world, mark).contains(&place(6, 2));
         let begin = world.now();
         for _ in 0..400 {
             world.run_cycles(100);
@@ -361,8 +368,8 @@ fn breaks_of_two_rings_during_a_controlled_break_are_located_too() {
         println!(
             "cuts {cycles} cycles after the change: {:?} later: {:?}",
             world.now().since(begin),
-            told(&world, mark)
+            reports(&world, mark)
         );
-        assert!(is_located(&world), "cuts {cycles} cycles after the change: {:?}", told(&world, mark));
+        assert!(is_located(&world), "cuts {cycles} cycles after the change: {:?}", reports(&world, mark));
     }
 }

@@ -11,7 +11,7 @@ use ringcat_sim::network::Network;
 use scenarios::segments::{MAIN, REDUNDANT, at, wired};
 use scenarios::world::World;
 
-use super::{crossed, in_op, told};
+use super::{crossed, in_op, reports};
 
 /// Rings with these numbers of members, one behind the other, with a SubDevice before, between and behind them; and
 /// their closing cables.
@@ -79,7 +79,7 @@ fn rings_of_any_length_are_learned_without_a_crossed_line_report() {
                 world.run_cycles(100);
                 world.heal(cable);
                 world.run_cycles(200);
-                assert_eq!(told(&world, mark).len(), 2, "{what}, {cable:?}");
+                assert_eq!(reports(&world, mark).len(), 2, "{what}, {cable:?}");
             }
             assert_eq!(crossed(&world, world.beginning()), 0, "{what}");
         }

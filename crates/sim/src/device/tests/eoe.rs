@@ -235,11 +235,11 @@ fn addresses_are_set_and_read() {
     let mut client = addressed();
     post(&mut client, EoeBody::GetIp);
     let bytes = answer(&mut client);
-    let EoeBody::Ip(EoeResult::OK, told) = EoeMessage::decode(&bytes).unwrap().body else {
+    let EoeBody::Ip(EoeResult::OK, reports) = EoeMessage::decode(&bytes).unwrap().body else {
         panic!("{bytes:?}");
     };
-    assert_eq!((told.address, told.mask), (Some(DEVICE), Some(Ipv4Addr::new(255, 255, 255, 0))));
-    assert_eq!(told.mac, Some(client.bench.device.description.services.eoe.mac));
+    assert_eq!((reports.address, reports.mask), (Some(DEVICE), Some(Ipv4Addr::new(255, 255, 255, 0))));
+    assert_eq!(reports.mac, Some(client.bench.device.description.services.eoe.mac));
     let mut result = |parameters| {
         post(&mut client, EoeBody::SetIp(parameters));
         let bytes = answer(&mut client);

@@ -31,7 +31,7 @@ impl Segment {
         self.clocks.epoch = time.wrapping_sub(sent_at.0);
         let delays = if is_same { Delays::Valid } else { Delays::Doubtful(now) };
         self.clocks.life = Life::Running(Running { delays, ..Running::default() });
-        self.compared.begin(&self.board);
+        self.words.before.begin(&self.board);
         self.clocks.times.follow_no_first();
         let shift = own.wrapping_sub(self.clocks.epoch);
         let timeline = self.clocks.times.turn(0, (shift, 0), self.clocks.epoch);

@@ -123,7 +123,7 @@ impl Segment {
             effects.report(Event::ClocksFailed { reason });
         }
         self.clocks.life = Life::NotSetUp(reason.or(reported));
-        self.compared.begin(&self.board);
+        self.words.before.begin(&self.board);
     }
 
     fn observe_measured_again(&mut self, measured: &Measured) {

@@ -47,7 +47,7 @@ fn a_group_at_the_end_of_a_local_ring_returns_as_its_end() {
         power_on_group(&mut world);
         for cable in [3, 4, 5, 6] {
             let mark = edge(&mut world, &what, |world| world.cut(CableId(cable)));
-            assert!(told(&world, mark).len() <= 1, "{what}, cable {cable}");
+            assert!(reports(&world, mark).len() <= 1, "{what}, cable {cable}");
             edge(&mut world, &what, |world| world.heal(CableId(cable)));
         }
         assert_eq!(rescan(&mut world)[..6], [Some(0), Some(1), Some(2), Some(3), Some(5), Some(6)], "{what}");
@@ -59,7 +59,7 @@ fn a_group_at_the_end_of_a_local_ring_returns_as_its_end() {
             for broken in [true, false] {
                 let fault = if broken { Fault::Cut } else { Fault::Heal };
                 let mark = edge(&mut world, &what, |world| world.fault(fault(CableId(cable))));
-                assert_eq!(told(&world, mark), [ends(broken)], "{what}, cable {cable}");
+                assert_eq!(reports(&world, mark), [ends(broken)], "{what}, cable {cable}");
             }
         }
         assert_eq!(crossed(&world, world.beginning()), 0, "{what}");

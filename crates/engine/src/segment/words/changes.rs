@@ -1,11 +1,9 @@
-//! Changes of the segment that posted words show, counted for the procedures that wait for one. Rules of the model
-//! compare the words with references of their own: a round with those at its begin (`attention`), the ring with what
-//! was reported (`ring`), idle operation with the last scan (`rules/idle`), silence with the last answer
-//! (`rules/silence`).
+//! Since the words before: changes of the segment, counted for the procedures that wait for one.
 
-use super::clocks::Clocks;
-use super::ring::Words;
+use super::posted::{Words, counts_of};
 use crate::board::Board;
+use crate::ring_status::LinkCounts;
+use crate::segment::clocks::Clocks;
 
 /// Numbers of changes so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,35 +22,35 @@ struct Shown {
     /// [`crate::board::RingWord::changes`].
     ring: u32,
     /// SubDevices that answer on each link.
-    answering: (u16, u16),
+    answering: LinkCounts,
     /// Stops of the time distribution after changes of ports.
     holds: u32,
 }
 
-/// The changes, and what the next words are compared with.
+/// The words before, and the changes so far.
 #[derive(Debug, Default)]
-pub(super) struct Compared {
+pub struct SinceBefore {
     shown: Shown,
     has_answered: bool,
     /// Changes so far.
     pub changes: Changes,
 }
 
-impl Compared {
+impl SinceBefore {
     /// The segment is now as the clocks were measured, or could not be: words are compared with those posted now.
     pub fn begin(&mut self, board: &Board) {
-        let answering = board.supervision().map_or((0, 0), |(_, seen)| (seen.main.0, seen.redundant.0));
+        let answering = board.supervision().map(|(_, result)| counts_of(&result)).unwrap_or_default();
         self.shown = Shown { ring: board.ring().changes, answering, holds: board.clocks.holds() };
-        self.has_answered = answering != (0, 0);
+        self.has_answered = answering != LinkCounts::default();
     }
 
     /// Compares posted words with the last ones.
     pub fn observe(&mut self, words: &Words, holds: u32, clocks: &Clocks) {
-        let answering = words.supervision.map_or((0, 0), |(_, seen)| (seen.main.0, seen.redundant.0));
+        let answering = words.answering();
         let now = Shown { ring: words.ring.changes, answering, holds };
         let before = core::mem::replace(&mut self.shown, now);
         let had_answered = self.has_answered;
-        self.has_answered |= answering != (0, 0);
+        self.has_answered |= answering != LinkCounts::default();
         self.changes.ring = self.changes.ring.wrapping_add(u32::from(before.ring != now.ring));
         // Clocks that were set up read on their own why the distribution has stopped.
         let is_set_up = clocks.are_set_up();
@@ -60,10 +58,10 @@ impl Compared {
         if compared(before) == compared(now) {
             return;
         }
-        let count = usize::from(answering.0) + usize::from(answering.1);
+        let count = usize::from(answering.main) + usize::from(answering.redundant);
         let is_beginning = match is_set_up {
             true => !had_answered && clocks.measured_count() == Some(count),
-            false => before.answering == (0, 0),
+            false => before.answering == LinkCounts::default(),
         };
         let counter = if is_beginning { &mut self.changes.beginnings } else { &mut self.changes.segment };
         *counter = counter.wrapping_add(1);

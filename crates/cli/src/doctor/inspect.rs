@@ -1,7 +1,7 @@
-//! What the doctor may look at: files, directories, network interfaces, environment variables. Nothing is changed.
+//! What the doctor reads: files, directories, network interfaces, environment variables. Nothing is changed.
 //!
 //! A machine is a directory in which its files are, and what its kernel answers; tests have one of their own. Files may
-//! hold anything and be of any size: reading is limited, and bytes that are no text are replaced. A look that is not
+//! hold anything and be of any size: reading is limited, and bytes that are no text are replaced. A check that is not
 //! possible is [`Unseen`] with its reason, never a guess.
 
 use std::fmt;
@@ -47,7 +47,7 @@ impl fmt::Display for Unseen {
 }
 
 /// A machine.
-pub trait Look {
+pub trait Inspect {
     /// The directory that is its `/`.
     fn root(&self) -> &Path;
 
@@ -144,7 +144,7 @@ fn unseen(path: &str, error: &io::Error) -> Unseen {
 #[derive(Clone, Copy, Debug)]
 pub struct Machine;
 
-impl Look for Machine {
+impl Inspect for Machine {
     fn root(&self) -> &Path {
         Path::new("/")
     }
@@ -167,7 +167,7 @@ impl Look for Machine {
 }
 
 /// The text of a file, or `None` where it is not there, which says something too.
-pub fn read_if_there(machine: &dyn Look, path: &str) -> Result<Option<String>, Unseen> {
+pub fn read_if_there(machine: &dyn Inspect, path: &str) -> Result<Option<String>, Unseen> {
     match machine.read(path) {
         Ok(text) => Ok(Some(text)),
         Err(Unseen::Missing(_)) => Ok(None),
@@ -176,12 +176,12 @@ pub fn read_if_there(machine: &dyn Look, path: &str) -> Result<Option<String>, U
 }
 
 /// A file that holds one number.
-pub fn number(machine: &dyn Look, path: &str) -> Result<i64, Unseen> {
+pub fn number(machine: &dyn Inspect, path: &str) -> Result<i64, Unseen> {
     machine.read(path)?.parse().map_err(|_| Unseen::Strange(path.to_owned()))
 }
 
 /// The first of these processes that runs, by the names that the kernel keeps (15 characters).
-pub fn running(machine: &dyn Look, names: &[&str]) -> Result<Option<String>, Unseen> {
+pub fn running(machine: &dyn Inspect, names: &[&str]) -> Result<Option<String>, Unseen> {
     // Where processes of others are hidden, the first one is too.
     machine.read("/proc/1/comm")?;
     let processes = machine.list("/proc")?.into_iter().filter(|name| name.bytes().all(|byte| byte.is_ascii_digit()));
