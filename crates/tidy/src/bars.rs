@@ -79,7 +79,8 @@ const GUIDE: &str = "docs/guide/";
 const EXAMPLES: usize = 20;
 
 /// Up to which commit the language is reviewed; what is newer is `git log COMMIT..`.
-const REVIEWED: &str = "up to 79dfece8, 2026-11-29: since the 28th pages but protocol and ethercat-json, not all comments";
+const REVIEWED: &str =
+    "up to 79dfece8, 2026-11-29: since the 28th pages but protocol and ethercat-json, not all comments";
 
 /// Bars that are measured by running something: what, the bar, the command.
 pub const ELSEWHERE: [(&str, &str, &str); 8] = [
