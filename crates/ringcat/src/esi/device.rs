@@ -37,7 +37,7 @@ pub(super) fn describe(
         description.pdos = of_device(device);
     }
     add_modules(device, &placed, &mut description)?;
-    description.objects = objects::objects(device, &placed, &description.pdos)?;
+    description.objects = objects::objects(esi, device, &placed, &description.pdos)?;
     description.controller_fmmus = device.info.fmmu_count.filter(|count| *count > 0);
     Ok(description)
 }
