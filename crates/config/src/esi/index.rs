@@ -1,9 +1,9 @@
 //! An index over device descriptions: which file describes a device, without reading the files again (protocol ES-25,
 //! ES-29, ES-30).
 //!
-//! Input: descriptions that were read once, with size and time of their files and of those to which they refer. Output: choices by identity, lists of
-//! devices, and a text to keep. A text of another version, or a damaged one, is no index: the caller reads the files
-//! again. The caller opens files; nothing here does.
+//! Input: descriptions that were read once, with size and time of their files and of those to which they refer. Output:
+//! choices by identity, lists of devices, and a text to keep. A text of another version, or a damaged one, is no index:
+//! the caller reads the files again. The caller opens files; nothing here does.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write as _;

@@ -32,8 +32,8 @@ impl References for NoReferences {
 /// Reads a file with the modules and dictionaries that it refers to.
 ///
 /// # Errors
-/// The errors of [`read`] for each file; references that leave the folder or form a circle; more files, modules or bytes
-/// than a description has. An error in another file names the description too ([`EsiProblem::Referred`]).
+/// The errors of [`read`] for each file; references that leave the folder or form a circle; more files, modules or
+/// bytes than a description has. An error in another file names the description too ([`EsiProblem::Referred`]).
 pub fn read_with(name: &str, bytes: &[u8], references: &dyn References) -> Result<Esi, EsiError> {
     let mut esi = read(name, bytes)?;
     let mut files = Files { references, left: MAX_REFERENCED_BYTES, dictionaries: HashMap::new() };

@@ -132,8 +132,8 @@ fn the_files_that_a_description_refers_to_have_a_limit_together() {
     let files = counted([("1.xml", long.clone()), ("2.xml", long)]);
     let devices = [1, 2].map(|at| device(at, &format!("<DictionaryFile>{at}.xml</DictionaryFile>"))).concat();
     let error = read(&description(&devices), &files).unwrap_err();
-    let expected = "acme.xml:6: device \"A2\": too much for a device description: more than 67108864 bytes in the files \
-                    that it refers to";
+    let expected = "acme.xml:6: device \"A2\": too much for a device description: \
+                    more than 67108864 bytes in the files that it refers to";
     assert_eq!(error, expected);
 }
 
