@@ -240,7 +240,7 @@ mod tests {
         place.write("x.xml", &description(1, "first").replace("</Device>", &profile("D.xml")));
         place.write("more/y.xml", &description(2, "second").replace("</Device>", &profile("sub/e.dict")));
         let dictionary = "<EtherCATDict><Dictionary/></EtherCATDict>";
-        place.write("d.xml", "<EtherCATDict>\n<Broken></EtherCATDict>");
+        place.write("d.xml", "<EtherCATDict>\n<Dictionary><Objects><Object/></Objects></Dictionary></EtherCATDict>");
         let opened = |place: &Place| {
             let folder = place.open();
             let refused: Vec<String> = folder.index().files().iter().filter_map(|file| file.refused.clone()).collect();
