@@ -2,13 +2,14 @@
 //! images. No interface is needed.
 
 use std::fs;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
 use ringcat::config::esi::Esi;
 use ringcat::config::esi::sii::{Comparison, Likeness, SiiOptions, SiiProfile, build, most_alike, skeleton};
-use ringcat::esi::load;
-use ringcat::wire::sii::Sii;
+use ringcat::esi::{EsiFailure, load};
+use ringcat::wire::sii::{Sii, SiiHeader};
 
 use crate::esi::device::{DeviceArguments, read};
 use crate::failure::Failure;
@@ -150,16 +151,34 @@ fn descriptions(path: &Path) -> Result<Vec<Esi>, Failure> {
     let mut files: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
     files.retain(|path| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml")));
     files.sort();
-    let read = |path: &PathBuf| load(path).map_err(warn).ok();
+    let is_companion = |error: &EsiFailure| matches!(error, EsiFailure::Esi(error) if error.is_companion());
+    let left_out = |error: EsiFailure| {
+        if is_companion(&error) {
+        } else {
+            warn(format!("left out: {error}"))
+        }
+    };
+    let read = |path: &PathBuf| load(path).map_err(left_out).ok();
     Ok(files.iter().filter_map(read).collect())
+}
+
+/// The bytes of an image. The limit applies to what is read: a device reports no length.
+fn image_of(path: &Path) -> Result<Vec<u8>, Failure> {
+    const LIMIT: usize = SiiHeader::MAX_EEPROM_BYTES;
+    let mut bytes = Vec::new();
+    let read = fs::File::open(path).and_then(|file| file.take(LIMIT as u64 + 1).read_to_end(&mut bytes));
+    read.map_err(|error| Failure::new(format!("{} cannot be read: {error}", path.display())))?;
+    match bytes.len() > LIMIT {
+        true => Err(Failure::new(format!("{} is longer than {LIMIT} bytes, the largest EEPROM", path.display()))),
+        false => Ok(bytes),
+    }
 }
 
 fn compared(arguments: &CompareArguments) -> Result<Report, Failure> {
     let all = descriptions(&arguments.esi)?;
     let mut images = Vec::new();
     for path in &arguments.images {
-        let bytes = fs::read(path);
-        let bytes = bytes.map_err(|error| Failure::new(format!("{} cannot be read: {error}", path.display())))?;
+        let bytes = image_of(path)?;
         let image = against(&all, path, &bytes);
         lines(&image).iter().for_each(|line| say!("{line}"));
         images.push(image);
@@ -258,7 +277,7 @@ fn lines(image: &ComparedImage) -> Vec<String> {
 fn described(arguments: &SkeletonArguments) -> Result<Report, Failure> {
     let path = &arguments.image;
     let failed = |text: String| Failure::new(format!("{}: {text}", path.display()));
-    let bytes = fs::read(path).map_err(|error| failed(format!("cannot be read: {error}")))?;
+    let bytes = image_of(path)?;
     let xml = skeleton(&bytes).map_err(|error| failed(error.to_string()))?;
     let out = &arguments.out;
     fs::write(out, &xml).map_err(|error| Failure::new(format!("{} cannot be written: {error}", out.display())))?;

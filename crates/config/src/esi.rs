@@ -26,7 +26,10 @@ mod values;
 pub use choices::{Choices, EntryChoice, MappingChoice, Parameter, PdoChoice, SamplesChoice};
 pub use detected::detected_modules;
 pub use error::{EsiError, EsiProblem, Notice};
-pub use limits::{MAX_ATTRIBUTE_BYTES, MAX_DEVICES, MAX_ELEMENTS, MAX_REFERENCES, MAX_TEXT_BYTES};
+pub use limits::{
+    MAX_ATTRIBUTE_BYTES, MAX_DEVICES, MAX_DICTIONARIES, MAX_ELEMENTS, MAX_PARTS, MAX_PARTS_BYTES, MAX_REFERENCED_BYTES,
+    MAX_REFERENCES, MAX_TEXT_BYTES,
+};
 pub use model::{
     Access, AllowedModule, AoeSettings, ArrayBounds, Check, ClockSettings, CoeCommand, CoeSettings, Controller,
     DataType, Device, Dictionary, Eeprom, EepromCategory, EepromContent, EoeSettings, Esi, Flags, Fmmu, FmmuRole,
@@ -40,7 +43,7 @@ pub use references::{NoReferences, References, read_with};
 pub use rules::{Choice, choose};
 pub use select::select;
 pub use selection::{SelectedCommand, SelectedMessage, SelectedSyncManager, Selection};
-pub use values::{Part, parts};
+pub use values::{Part, PartsRoom, parts};
 
 use crate::xml;
 

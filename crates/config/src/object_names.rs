@@ -8,12 +8,14 @@ use std::sync::Arc;
 use ringcat_engine::info::SubDeviceInfo;
 
 use crate::eni;
-use crate::esi::{Device, Dictionary, Object, Pdo, PlacedModule, parts};
+use crate::esi::{Device, Dictionary, Object, PartsRoom, Pdo, PlacedModule, parts};
 #[cfg(feature = "network")]
 use crate::network::model;
 
 /// Names of a SubDevice at most; further ones are left out.
 const MAX_NAMES: usize = 1 << 16;
+/// Characters of a name; the rest is left out.
+const MAX_NAME: usize = 256;
 /// Words in front of an index without a subindex that is that of an object.
 const BEFORE_INDEX: [&str; 2] = ["PDO ", "object "];
 
@@ -78,16 +80,17 @@ impl ObjectNames {
                 }
             }
         }
-        for dictionary in device.profiles.iter().filter_map(|profile| profile.dictionary.as_ref()) {
+        let room = &mut PartsRoom::default();
+        for dictionary in device.profiles.iter().filter_map(|profile| profile.dictionary.as_deref()) {
             for object in &dictionary.objects {
-                self.add_dictionary(dictionary, object, object.index.index, language);
+                self.add_dictionary(dictionary, object, object.index.index, (language, room));
             }
         }
         for placed in modules {
-            for dictionary in placed.module.profiles.iter().filter_map(|profile| profile.dictionary.as_ref()) {
+            for dictionary in placed.module.profiles.iter().filter_map(|profile| profile.dictionary.as_deref()) {
                 for object in &dictionary.objects {
                     if let Some(index) = placed.index(object.index) {
-                        self.add_dictionary(dictionary, object, index, language);
+                        self.add_dictionary(dictionary, object, index, (language, room));
                     }
                 }
             }
@@ -100,13 +103,20 @@ impl ObjectNames {
         }
     }
 
-    fn add_dictionary(&mut self, dictionary: &Dictionary, object: &Object, index: u16, language: u32) {
+    fn add_dictionary(
+        &mut self,
+        dictionary: &Dictionary,
+        object: &Object,
+        index: u16,
+        (language, room): (u32, &mut PartsRoom),
+    ) {
         if self.is_full() {
             return;
         }
         let name = object.name.in_language(language);
         self.add_object(index, name);
-        let parts = parts(dictionary, object);
+        // Parts without room are left out like names above the limit.
+        let Ok(parts) = parts(dictionary, object, room) else { return };
         if parts.len() == 1 {
             return;
         }
@@ -182,7 +192,7 @@ impl ObjectNames {
 
 /// Sets a name that is not known yet.
 fn add<K: Ord>(entry: Entry<'_, K, String>, name: &str) {
-    let name: String = name.trim().chars().filter(|character| !character.is_control()).collect();
+    let name: String = name.trim().chars().filter(|character| !character.is_control()).take(MAX_NAME).collect();
     if let Entry::Vacant(free) = entry
         && !name.is_empty()
     {

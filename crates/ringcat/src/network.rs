@@ -95,12 +95,19 @@ impl LoadedNetwork {
     /// # Errors
     /// [`NetworkFailure`]: with file, line and key where something in it is wrong.
     pub fn load(path: &Path) -> Result<LoadedNetwork, NetworkFailure> {
-        // The limit applies to the bytes that are read: a device or a pipe reports no length.
+        // The limit applies to the bytes that are read too: a device or a pipe reports no length.
         let mut bytes = Vec::new();
-        let room = MAX_NETWORK_BYTES as u64 + 1;
-        let read = File::open(path).and_then(|file| file.take(room).read_to_end(&mut bytes));
-        read.map_err(|error| NetworkFailure::Read { path: path.to_owned(), error })?;
-        LoadedNetwork::from_bytes(&path.display().to_string(), &bytes)
+        let read = File::open(path).and_then(|file| {
+            let length = file.metadata()?.len();
+            file.take(MAX_NETWORK_BYTES as u64 + 1).read_to_end(&mut bytes)?;
+            Ok(length)
+        });
+        let length = read.map_err(|error| NetworkFailure::Read { path: path.to_owned(), error })?;
+        let name = path.display().to_string();
+        if bytes.len() > MAX_NETWORK_BYTES && length > MAX_NETWORK_BYTES as u64 {
+            return Err(NetworkFailure::Content(Box::new(NetworkError::too_long(&name, length))));
+        }
+        LoadedNetwork::from_bytes(&name, &bytes)
     }
 
     /// Reads the bytes of a file; `name` is the file in messages.

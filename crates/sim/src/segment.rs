@@ -12,6 +12,8 @@ mod keys;
 mod services;
 mod topology;
 
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 use crate::cable::CableSpec;
@@ -59,7 +61,7 @@ impl Segment {
     /// # Errors
     /// The errors of [`Segment::load`], and those of the description files.
     pub fn load_with(path: &Path, descriptions: &dyn DescribedDevices) -> Result<Segment, SegmentError> {
-        let bytes = read(path).map_err(|text| SegmentError::new(text).in_file(path))?;
+        let bytes = read_at_most(path, MOST_BYTES).map_err(|text| SegmentError::new(text).in_file(path))?;
         let text = String::from_utf8(bytes).map_err(|error| {
             let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
             let line = 1 + valid.iter().filter(|byte| **byte == b'\n').count();
@@ -101,14 +103,20 @@ impl Segment {
     }
 }
 
-/// The bytes of a segment file. A pipe could keep its reader waiting for ever, and a device never ends.
-fn read(path: &Path) -> Result<Vec<u8>, String> {
+/// The bytes of a segment file, or of a file that it names. A pipe could keep its reader waiting for ever, and a device
+/// never ends.
+fn read_at_most(path: &Path, limit: u64) -> Result<Vec<u8>, String> {
     let failed = |error: std::io::Error| format!("cannot be read: {error}");
     let kind = std::fs::metadata(path).map_err(failed)?;
-    match () {
-        () if !kind.is_file() && !kind.is_dir() => Err("cannot be read: it is no regular file".to_owned()),
-        () if kind.len() > MOST_BYTES => Err(format!("it is longer than {MOST_BYTES} bytes")),
-        () => std::fs::read(path).map_err(failed),
+    if !kind.is_file() && !kind.is_dir() {
+        return Err("cannot be read: it is no regular file".to_owned());
+    }
+    let mut bytes = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(limit + 1).read_to_end(&mut bytes));
+    read.map_err(failed)?;
+    match bytes.len() as u64 > limit {
+        true => Err(format!("is longer than {limit} bytes")),
+        false => Ok(bytes),
     }
 }
 

@@ -48,7 +48,7 @@ fn shown(esi: &Esi, device: &Device) -> EsiShow {
         assign_activate: mode.assign_activate,
     });
     let slots = device.slots.iter().flat_map(|slots| &slots.slots).map(|slot| shown_slot(esi, slot));
-    let dictionaries = device.profiles.iter().filter_map(|profile| profile.dictionary.as_ref());
+    let dictionaries = device.profiles.iter().filter_map(|profile| profile.dictionary.as_deref());
     let mailbox = device.mailbox.as_ref();
     let protocols = [
         ("AoE", mailbox.is_some_and(|it| it.aoe.is_some())),

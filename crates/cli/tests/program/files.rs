@@ -296,6 +296,13 @@ fn images_are_built_compared_and_described_again() {
     assert!(differs.code == Some(1) && differs.out.contains("string"), "{}", differs.all());
     let skeleton = ringcat(&["sii", "skeleton", &image, "--out", &place.path("again.xml")]);
     assert!(skeleton.code == Some(0) && place.read("again.xml").contains("ProductCode"), "{}", skeleton.all());
+    for endless in [
+        ringcat(&["sii", "compare", "/dev/zero", "--esi", &acme]),
+        ringcat(&["sii", "skeleton", "/dev/zero", "--out", &place.path("again.xml")]),
+    ] {
+        let expected = "/dev/zero is longer than 8388608 bytes, the largest EEPROM";
+        assert!(endless.code == Some(2) && endless.errors.contains(expected), "{}", endless.all());
+    }
     let unknown = ringcat(&["sii", "build", &acme, "--type", "AD09", "--out", &image]);
     assert!(
         unknown.code == Some(2) && unknown.all().contains("there is no such device: type \"AD09\""),

@@ -198,13 +198,8 @@ impl<'a> Element<'a> {
     /// An error about this element.
     pub fn error(&self, problem: EsiProblem) -> EsiError {
         let place = Some(self.file.lines.place(self.node.range().start));
-        EsiError {
-            file: self.file.name.into(),
-            place,
-            device: self.device().into(),
-            element: self.path().into(),
-            problem,
-        }
+        let error = EsiError::at_line(self.file.name, 0, &self.device(), problem);
+        EsiError { place, element: self.path().into(), ..error }
     }
 
     /// An error about the value of this element.

@@ -5,6 +5,11 @@ use std::fmt;
 
 use crate::xml::{Place, XmlError, XmlProblem};
 
+/// Roots of files to which descriptions refer, and what they are.
+pub(super) const COMPANIONS: [(&str, &str); 2] = [
+    ("EtherCATDict", "an object dictionary that a device description refers to"),
+    ("EtherCATDiag", "a list of diagnosis messages that a device description refers to"),
+];
 /// Different notices of a file; further ones are counted.
 const MAX_NOTICES: usize = 200;
 
@@ -69,6 +74,11 @@ pub enum EsiProblem {
         /// Line of the first one.
         first_line: u32,
     },
+    /// A file to which the description refers cannot be used.
+    Referred {
+        /// Why, with file and line.
+        error: Box<EsiError>,
+    },
     /// A rule of ETG.2000 or ETG.2010 does not hold, or a choice contradicts the file.
     Rule {
         /// What does not hold.
@@ -77,6 +87,12 @@ pub enum EsiProblem {
 }
 
 impl EsiError {
+    /// Whether the file is no description itself, but belongs to one that refers to it: a dictionary, or texts of
+    /// diagnosis messages.
+    pub fn is_companion(&self) -> bool {
+        matches!(&self.problem, EsiProblem::WrongFile { kind } if COMPANIONS.iter().any(|(_, it)| kind == it))
+    }
+
     /// An error about the bytes or the XML of a file.
     pub(crate) fn of_xml(file: &str, error: XmlError) -> EsiError {
         let problem = match error.problem {
@@ -85,18 +101,23 @@ impl EsiError {
             XmlProblem::Syntax { reason } => EsiProblem::Xml { reason },
             XmlProblem::NotXml => EsiProblem::WrongFile { kind: "no XML file".to_owned() },
         };
-        EsiError { file: file.into(), place: error.place, device: "".into(), element: "".into(), problem }
+        EsiError { place: error.place, ..EsiError::at_line(file, 0, "", problem) }
     }
 
     /// A rule that does not hold for a device, at a line of its file.
     pub(crate) fn rule(file: &str, line: u32, device: &str, reason: impl Into<String>) -> EsiError {
-        EsiError {
-            file: file.into(),
-            place: (line > 0).then_some(Place { line, column: 1 }),
-            device: device.into(),
-            element: "".into(),
-            problem: EsiProblem::Rule { reason: reason.into() },
-        }
+        EsiError::at_line(file, line, device, EsiProblem::Rule { reason: reason.into() })
+    }
+
+    /// An error about a file to which a device or module refers at a line of a file.
+    pub(crate) fn referred(file: &str, line: u32, device: &str, error: EsiError) -> EsiError {
+        EsiError::at_line(file, line, device, EsiProblem::Referred { error: Box::new(error) })
+    }
+
+    /// An error about a device or module at a line of a file; 0 is no line.
+    pub fn at_line(file: &str, line: u32, device: &str, problem: EsiProblem) -> EsiError {
+        let place = (line > 0).then_some(Place { line, column: 1 });
+        EsiError { file: file.into(), place, device: device.into(), element: "".into(), problem }
     }
 }
 
@@ -114,6 +135,7 @@ impl fmt::Display for EsiProblem {
             EsiProblem::Missing { element } => write!(f, "{element} is missing"),
             EsiProblem::Value { expected, got } => write!(f, "expected {expected}, got {got}"),
             EsiProblem::Duplicate { what, first_line } => write!(f, "{what} is defined in line {first_line} already"),
+            EsiProblem::Referred { error } => write!(f, "a file that it refers to: {error}"),
             EsiProblem::Rule { reason } => f.write_str(reason),
         }
     }

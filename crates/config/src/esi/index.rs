@@ -1,18 +1,18 @@
 //! An index over device descriptions: which file describes a device, without reading the files again (protocol ES-25,
 //! ES-29, ES-30).
 //!
-//! Input: descriptions that were read once, with size and time of their files. Output: choices by identity, lists of
-//! devices, and a text to keep. A text of another version, or a damaged one, is no index: the caller reads the files
-//! again. The caller opens files; nothing here does.
+//! Input: descriptions that were read once, with size and time of their files and of those to which they refer. Output:
+//! choices by identity, lists of devices, and a text to keep. A text of another version, or a damaged one, is no index:
+//! the caller reads the files again. The caller opens files; nothing here does.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write as _;
 
 use super::model::Esi;
 use super::rules::{Choice, choose};
 
 /// First line of the text.
-const HEAD: &str = "RingCAT index of device descriptions 1";
+const HEAD: &str = "RingCAT index of device descriptions 2";
 /// Most characters of a text in the index.
 const MAX_TEXT: usize = 200;
 
@@ -33,6 +33,9 @@ pub struct IndexedFile {
     pub path: String,
     /// Size and time.
     pub stamp: Stamp,
+    /// Files to which it refers, by path as its own: another size or time of one counts like its own. `None`: there was
+    /// none.
+    pub refers_to: Vec<(String, Option<Stamp>)>,
     /// Why it was refused; it has no devices then.
     pub refused: Option<String>,
     /// Devices in document order.
@@ -75,6 +78,8 @@ pub struct Described<'a> {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Index {
     files: Vec<IndexedFile>,
+    /// Files by path.
+    paths: HashMap<String, usize>,
     /// Places of each identity, the newest file first.
     places: BTreeMap<Key, Vec<Place>>,
     hidden: BTreeSet<Key>,
@@ -103,12 +108,26 @@ impl IndexedFile {
                 hides: hides.collect(),
             }
         });
-        IndexedFile { path: path.to_owned(), stamp, refused: None, devices: devices.collect() }
+        let devices = devices.collect();
+        IndexedFile { path: path.to_owned(), stamp, devices, ..IndexedFile::default() }
     }
 
     /// A file that was refused, with the reason.
     pub fn refused(path: &str, stamp: Stamp, reason: &str) -> IndexedFile {
-        IndexedFile { path: path.to_owned(), stamp, refused: Some(one_line(reason)), devices: Vec::new() }
+        let refused = Some(one_line(reason));
+        IndexedFile { path: path.to_owned(), stamp, refused, ..IndexedFile::default() }
+    }
+
+    /// The file with those to which it refers.
+    #[must_use]
+    pub fn with_references(self, refers_to: Vec<(String, Option<Stamp>)>) -> IndexedFile {
+        IndexedFile { refers_to, ..self }
+    }
+
+    /// Whether its paths can be kept in a line each.
+    fn can_be_kept(&self) -> bool {
+        let mut paths = std::iter::once(&self.path).chain(self.refers_to.iter().map(|(path, _)| path));
+        !paths.any(|path| path.contains(char::is_control))
     }
 }
 
@@ -132,7 +151,8 @@ impl Index {
         for places in places.values_mut() {
             places.sort_by_key(|(at, _)| std::cmp::Reverse(files[*at].stamp.modified_ns));
         }
-        Index { files, places, hidden }
+        let paths = files.iter().enumerate().map(|(at, file)| (file.path.clone(), at)).collect();
+        Index { files, paths, places, hidden }
     }
 
     /// The files.
@@ -140,9 +160,11 @@ impl Index {
         &self.files
     }
 
-    /// The entry of a file that has not changed.
-    pub fn unchanged(&self, path: &str, stamp: Stamp) -> Option<&IndexedFile> {
-        self.files.iter().find(|file| file.path == path && file.stamp == stamp)
+    /// The entry of a file that has not changed, nor any file to which it refers; `now` gives their size and time.
+    pub fn unchanged(&self, path: &str, stamp: Stamp, now: impl Fn(&str) -> Option<Stamp>) -> Option<&IndexedFile> {
+        let file = self.files.get(*self.paths.get(path)?)?;
+        let is_same = file.stamp == stamp && file.refers_to.iter().all(|(path, known)| now(path) == *known);
+        is_same.then_some(file)
     }
 
     /// All descriptions by identity; of an identity in several files that of the newest file.
@@ -182,10 +204,16 @@ impl Index {
     /// The text to keep.
     pub fn to_text(&self) -> String {
         let mut text = format!("{HEAD}\n");
-        for file in &self.files {
+        for file in self.files.iter().filter(|file| file.can_be_kept()) {
             let Stamp { bytes, modified_ns } = file.stamp;
             // Writing into a String cannot fail.
             let _ = writeln!(text, "file\t{bytes}\t{modified_ns}\t{}", file.path);
+            for (path, known) in &file.refers_to {
+                let _ = match known {
+                    Some(Stamp { bytes, modified_ns }) => writeln!(text, "refers\t{bytes}\t{modified_ns}\t{path}"),
+                    None => writeln!(text, "lacks\t{path}"),
+                };
+            }
             if let Some(reason) = &file.refused {
                 let _ = writeln!(text, "refused\t{reason}");
             }
@@ -213,6 +241,11 @@ impl Index {
             let (kind, rest) = line.split_once('\t').unwrap_or((line, ""));
             match kind {
                 "file" => files.push(file_line(rest)?),
+                "refers" => {
+                    let IndexedFile { path, stamp, .. } = file_line(rest)?;
+                    files.last_mut()?.refers_to.push((path, Some(stamp)));
+                }
+                "lacks" => files.last_mut()?.refers_to.push((rest.to_owned(), None)),
                 "refused" => files.last_mut()?.refused = Some(rest.to_owned()),
                 "device" => files.last_mut()?.devices.push(device_line(rest)?),
                 "hides" => {
@@ -285,7 +318,8 @@ mod tests {
         ];
         let new = [device("A1 new", 1, 0x0012_0000, "")];
         Index::new(vec![file("old.xml", 5, &old), file("new.xml", 6, &new), {
-            IndexedFile::refused("bad.xml", Stamp::default(), "bad.xml:3: no\nVendor")
+            let refused = IndexedFile::refused("bad.xml", Stamp::default(), "bad.xml:3: no\nVendor");
+            refused.with_references(vec![("d.xml".to_owned(), Some(Stamp::default())), ("gone".to_owned(), None)])
         }])
     }
 
@@ -335,8 +369,14 @@ mod tests {
         assert_eq!(Index::from_text(&text), Some(index.clone()));
         assert_eq!(index.files()[0].devices[0].name, "A1 of Acme", "one line without tabs");
         let whole = Index::from_text(&text).expect("it is whole");
-        assert_eq!(whole.unchanged("old.xml", Stamp { bytes: 7, modified_ns: 5 }), index.files().first());
-        assert_eq!(whole.unchanged("old.xml", Stamp { bytes: 8, modified_ns: 5 }), None);
+        let none = |_: &str| None;
+        assert_eq!(whole.unchanged("old.xml", Stamp { bytes: 7, modified_ns: 5 }, none), index.files().first());
+        assert_eq!(whole.unchanged("old.xml", Stamp { bytes: 8, modified_ns: 5 }, none), None);
+        let bad = |now: fn(&str) -> Option<Stamp>| whole.unchanged("bad.xml", Stamp::default(), now).is_some();
+        assert!(bad(|path| (path == "d.xml").then(Stamp::default)));
+        assert!(!bad(|_| None) && !bad(|_| Some(Stamp::default())), "one is gone, one has appeared");
+        let odd = Index::new(vec![file("odd\nname.xml", 5, &[])]);
+        assert_eq!(Index::from_text(&odd.to_text()), Some(Index::default()), "a name of two lines is not kept");
         for end in (0..text.len() - 1).filter(|end| text.is_char_boundary(*end)) {
             assert_eq!(Index::from_text(&text[..end]), None, "cut at {end}");
         }

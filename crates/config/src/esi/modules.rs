@@ -5,7 +5,7 @@ use super::model::{CoeCommand, Device, Esi, Module, Object, Pdo, Slot, SlotDista
 use crate::xml::shown;
 
 /// Slots of a device, at most: subindices of 0xF030.
-const MAX_SLOTS: usize = 255;
+pub(super) const MAX_SLOTS: usize = 255;
 
 /// A module in a slot.
 #[derive(Clone, Debug, PartialEq, Eq)]

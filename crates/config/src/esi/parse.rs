@@ -17,7 +17,7 @@ use std::sync::Arc;
 use roxmltree::{Document, Node};
 
 use super::element::{Element, File};
-use super::error::{EsiError, EsiProblem};
+use super::error::{COMPANIONS, EsiError, EsiProblem};
 use super::limits::{MAX_ATTRIBUTE_BYTES, MAX_DEVICES, MAX_TEXT_BYTES};
 use super::model::{Device, Dictionary, Esi, Group, Reference, Vendor};
 use super::schema;
@@ -45,7 +45,8 @@ pub(super) fn dictionary(name: &str, text: &str) -> Result<Dictionary, EsiError>
     if root.name() != "EtherCATDict" {
         return Err(root.error(EsiProblem::WrongFile { kind: format!("a file with the root {}", shown(root.name())) }));
     }
-    dictionary::dictionary(root.required("Dictionary")?)
+    let dictionary = dictionary::dictionary(root.required("Dictionary")?)?;
+    Ok(Dictionary { file: Some(name.into()), ..dictionary })
 }
 
 fn document<'a>(name: &str, text: &'a str) -> Result<Document<'a>, EsiError> {
@@ -105,10 +106,11 @@ fn root(root: Element<'_>) -> Result<Esi, EsiError> {
 
 /// The kind of a file with another root.
 fn kind(root: &str) -> String {
+    if let Some((_, kind)) = COMPANIONS.iter().find(|(companion, _)| *companion == root) {
+        return (*kind).to_owned();
+    }
     match root {
         "EtherCATConfig" => "a network configuration (ENI), which `ringcat eni` reads".to_owned(),
-        "EtherCATDict" => "an object dictionary that a device description refers to".to_owned(),
-        "EtherCATDiag" => "a list of diagnosis messages that a device description refers to".to_owned(),
         "EtherCATInfoList" => "a list that `ethercat xml` prints".to_owned(),
         other => format!("an XML file with the root {}", shown(other)),
     }

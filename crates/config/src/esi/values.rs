@@ -1,5 +1,13 @@
 //! Objects of a dictionary with their parts: type, access and default of each subindex (protocol ES-22, ES-72, ES-73).
+//!
+//! A few elements of a file can describe many large values (a type that many objects share, with 256 texts of a
+//! megabyte): what the parts take is counted, and refused above a limit.
 
+use std::borrow::Cow;
+use std::collections::HashMap;
+
+use super::error::EsiProblem;
+use super::limits::{MAX_PARTS, MAX_PARTS_BYTES};
 use super::model::{DataType, Dictionary, Flags, Object, ObjectInfo, SubItem};
 use super::sii::code_of;
 
@@ -7,6 +15,8 @@ use super::sii::code_of;
 const MAX_CHAIN: usize = 8;
 /// Bytes of a value, at most: what no mailbox transfers in one service is no default.
 const MAX_VALUE: usize = 1 << 20;
+/// Bytes that a part takes besides its name and its values.
+const PART_BYTES: usize = 64;
 /// CoE types by size, for types without a code: unsigned numbers, else bytes.
 const OCTETS: u16 = 0x0A;
 
@@ -31,72 +41,141 @@ pub struct Part {
     pub maximum: Option<Vec<u8>>,
 }
 
-/// The parts of an object, subindices ascending.
-pub fn parts(dictionary: &Dictionary, object: &Object) -> Vec<Part> {
+/// Room for the parts of several objects, for instance those of a device with its modules: [`MAX_PARTS_BYTES`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PartsRoom {
+    left: usize,
+}
+
+impl Default for PartsRoom {
+    fn default() -> PartsRoom {
+        PartsRoom { left: MAX_PARTS_BYTES }
+    }
+}
+
+impl PartsRoom {
+    fn take(&mut self, bytes: usize) -> Result<(), EsiProblem> {
+        const WHAT: &str = "bytes of values and names of the objects of a device with its modules";
+        match self.left.checked_sub(bytes) {
+            Some(left) => self.left = left,
+            None => return Err(EsiProblem::TooMuch { what: WHAT, limit: MAX_PARTS_BYTES }),
+        }
+        Ok(())
+    }
+}
+
+/// The parts of an object, subindices ascending; what they take is taken from `room`.
+///
+/// # Errors
+/// [`EsiProblem::TooMuch`]: the room is not sufficient, or the type of the object has more than [`MAX_PARTS`] parts.
+pub fn parts(dictionary: &Dictionary, object: &Object, room: &mut PartsRoom) -> Result<Vec<Part>, EsiProblem> {
+    let mut sources = Vec::new();
     let data_type = dictionary.data_type(&object.data_type);
     let items = data_type.map_or(&[][..], |of| &of.sub_items);
     if items.is_empty() {
-        let name = object.name.english();
-        return vec![part(dictionary, 0, name, &object.data_type, object.bit_size, object.flags, Some(&object.info))];
+        sources.push(Source {
+            sub_index: 0,
+            name: object.name.english().into(),
+            data_type: &object.data_type,
+            bit_size: object.bit_size,
+            flags: object.flags,
+            info: Some(&object.info),
+        });
+    } else {
+        collect(dictionary, object, items, &mut sources)?;
+        // The first one of a subindex counts.
+        sources.sort_by_key(|source| source.sub_index);
+        sources.dedup_by_key(|source| source.sub_index);
     }
-    let mut parts = Vec::new();
+    sources.iter().map(|source| source.part(dictionary, room)).collect()
+}
+
+/// A part before its values are copied.
+struct Source<'a> {
+    sub_index: u8,
+    name: Cow<'a, str>,
+    data_type: &'a str,
+    bit_size: u32,
+    flags: Flags,
+    info: Option<&'a ObjectInfo>,
+}
+
+/// What the items of a record or an array describe.
+fn collect<'a>(
+    dictionary: &'a Dictionary,
+    object: &'a Object,
+    items: &'a [SubItem],
+    sources: &mut Vec<Source<'a>>,
+) -> Result<(), EsiProblem> {
+    let mut infos = HashMap::with_capacity(object.sub_items.len());
+    for info in &object.sub_items {
+        infos.entry(info.name.as_str()).or_insert(&info.info);
+    }
     for item in items {
         match (item.sub_index, dictionary.data_type(&item.data_type)) {
-            (None, Some(array)) if array.array.is_some() => parts.extend(elements(dictionary, object, item, array)),
-            (sub_index, _) => {
-                let info = object.sub_items.iter().find(|info| info.name == item.name).map(|info| &info.info);
-                let flags = item.flags.unwrap_or(object.flags);
-                let sub_index = sub_index.unwrap_or(0);
-                parts.push(part(dictionary, sub_index, &item.name, &item.data_type, item.bit_size, flags, info));
-            }
+            (None, Some(array)) if array.array.is_some() => sources.extend(elements(object, item, array)),
+            (sub_index, _) => sources.push(Source {
+                sub_index: sub_index.unwrap_or(0),
+                name: item.name.as_str().into(),
+                data_type: &item.data_type,
+                bit_size: item.bit_size,
+                flags: item.flags.unwrap_or(object.flags),
+                info: infos.get(item.name.as_str()).copied(),
+            }),
+        }
+        if sources.len() > MAX_PARTS {
+            return Err(EsiProblem::TooMuch { what: "parts of an object", limit: MAX_PARTS });
         }
     }
-    parts.sort_by_key(|part| part.sub_index);
-    parts.dedup_by_key(|part| part.sub_index);
-    parts
+    Ok(())
 }
 
 /// Elements of an array; their values follow each other from position 1 on.
-fn elements(dictionary: &Dictionary, object: &Object, item: &SubItem, array: &DataType) -> Vec<Part> {
+fn elements<'a>(object: &'a Object, item: &SubItem, array: &'a DataType) -> impl Iterator<Item = Source<'a>> {
     let bounds = array.array.unwrap_or(super::model::ArrayBounds { first: 1, elements: 0 });
     let base = array.base.as_deref().unwrap_or_default();
     let bits = array.bit_size.checked_div(bounds.elements).unwrap_or(0);
     let flags = item.flags.unwrap_or(object.flags);
-    let one = |sub_index: u8| {
-        let info = object.sub_items.get(usize::from(sub_index)).map(|info| &info.info);
-        let name = object.sub_items.get(usize::from(sub_index)).map(|info| info.name.clone());
-        let name = name.unwrap_or_else(|| format!("SubIndex {sub_index:03}"));
-        part(dictionary, sub_index, &name, base, bits, flags, info)
+    let one = move |sub_index: u8| {
+        let info = object.sub_items.get(usize::from(sub_index));
+        let name = info.map(|info| Cow::Borrowed(info.name.as_str()));
+        Source {
+            sub_index,
+            name: name.unwrap_or_else(|| format!("SubIndex {sub_index:03}").into()),
+            data_type: base,
+            bit_size: bits,
+            flags,
+            info: info.map(|info| &info.info),
+        }
     };
-    (1..=u8::MAX).take(bounds.elements as usize).map(one).collect()
+    (1..=u8::MAX).take(bounds.elements as usize).map(one)
 }
 
-fn part(
-    dictionary: &Dictionary,
-    sub_index: u8,
-    name: &str,
-    data_type: &str,
-    bit_size: u32,
-    flags: Flags,
-    info: Option<&ObjectInfo>,
-) -> Part {
-    let bit_size = if bit_size == 0 { dictionary.data_type(data_type).map_or(0, |of| of.bit_size) } else { bit_size };
-    let length = (bit_size.div_ceil(8) as usize).min(MAX_VALUE);
-    let sized = |bytes: &Vec<u8>| {
-        let mut bytes = bytes.clone();
-        bytes.resize(length, 0);
-        bytes
-    };
-    let default = info.and_then(|info| info.default.as_ref()).map_or_else(|| vec![0; length], sized);
-    Part {
-        sub_index,
-        name: name.to_owned(),
-        data_type: code(dictionary, data_type, bit_size),
-        bit_size,
-        flags,
-        default,
-        minimum: info.and_then(|info| info.minimum.as_ref()).map(sized),
-        maximum: info.and_then(|info| info.maximum.as_ref()).map(sized),
+impl Source<'_> {
+    fn part(&self, dictionary: &Dictionary, room: &mut PartsRoom) -> Result<Part, EsiProblem> {
+        let of_type = || dictionary.data_type(self.data_type).map_or(0, |of| of.bit_size);
+        let bit_size = if self.bit_size == 0 { of_type() } else { self.bit_size };
+        let length = (bit_size.div_ceil(8) as usize).min(MAX_VALUE);
+        let given = |of: fn(&ObjectInfo) -> &Option<Vec<u8>>| self.info.and_then(|info| of(info).as_ref());
+        let (default, minimum, maximum) =
+            (given(|info| &info.default), given(|info| &info.minimum), given(|info| &info.maximum));
+        let values = 1 + usize::from(minimum.is_some()) + usize::from(maximum.is_some());
+        room.take(PART_BYTES + self.name.len() + self.data_type.len() + values * length)?;
+        let sized = |bytes: &Vec<u8>| {
+            let mut sized = bytes[..bytes.len().min(length)].to_vec();
+            sized.resize(length, 0);
+            sized
+        };
+        Ok(Part {
+            sub_index: self.sub_index,
+            name: self.name.clone().into_owned(),
+            data_type: code(dictionary, self.data_type, bit_size),
+            bit_size,
+            flags: self.flags,
+            default: default.map_or_else(|| vec![0; length], sized),
+            minimum: minimum.map(sized),
+            maximum: maximum.map(sized),
+        })
     }
 }
 

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use super::read::MAX_NETWORK_BYTES;
+
 /// An error in a network file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -16,6 +18,19 @@ pub struct NetworkError {
     pub subdevice: String,
     /// Expected and actual value.
     pub message: String,
+}
+
+impl NetworkError {
+    /// The error of a file of `got` bytes, which is longer than [`MAX_NETWORK_BYTES`].
+    pub fn too_long(file: &str, got: u64) -> NetworkError {
+        NetworkError {
+            file: file.to_owned(),
+            line: None,
+            key: String::new(),
+            subdevice: String::new(),
+            message: format!("expected at most {MAX_NETWORK_BYTES} bytes, got {got}"),
+        }
+    }
 }
 
 impl fmt::Display for NetworkError {

@@ -4,7 +4,7 @@
 use super::from_esi::printable;
 use super::model::{Entry, SubDevice};
 use crate::esi::sii::name_of;
-use crate::esi::{self, Device, Dictionary, Object, PlacedModule, parts};
+use crate::esi::{self, Device, Dictionary, Object, PartsRoom, PlacedModule, parts};
 
 impl SubDevice {
     /// Fills in the names and types of PDOs and entries that it does not have, in `language`, an LcId: those of the PDO
@@ -73,14 +73,14 @@ fn of_entry(
 
 /// Name and type of the object that an entry maps, if it has as many bits: of the device, else of a module.
 fn of_object(device: &Device, modules: &[PlacedModule<'_>], entry: &Entry, language: u32) -> Option<(String, String)> {
-    let mut dictionaries = device.profiles.iter().filter_map(|profile| profile.dictionary.as_ref());
+    let mut dictionaries = device.profiles.iter().filter_map(|profile| profile.dictionary.as_deref());
     let of_device = dictionaries.find_map(|dictionary| {
         let object = dictionary.objects.iter().find(|object| object.index.index == entry.index)?;
         of_part(dictionary, object, entry, language)
     });
     of_device.or_else(|| {
         modules.iter().find_map(|placed| {
-            let mut dictionaries = placed.module.profiles.iter().filter_map(|profile| profile.dictionary.as_ref());
+            let mut dictionaries = placed.module.profiles.iter().filter_map(|profile| profile.dictionary.as_deref());
             dictionaries.find_map(|dictionary| {
                 let is_it = |object: &&Object| placed.index(object.index) == Some(entry.index);
                 of_part(dictionary, dictionary.objects.iter().find(is_it)?, entry, language)
@@ -90,7 +90,7 @@ fn of_object(device: &Device, modules: &[PlacedModule<'_>], entry: &Entry, langu
 }
 
 fn of_part(dictionary: &Dictionary, object: &Object, entry: &Entry, language: u32) -> Option<(String, String)> {
-    let parts = parts(dictionary, object);
+    let parts = parts(dictionary, object, &mut PartsRoom::default()).ok()?;
     let part = parts.iter().find(|part| part.sub_index == entry.sub && part.bit_size == u32::from(entry.bits))?;
     let name = if parts.len() == 1 { object.name.in_language(language) } else { &part.name };
     Some((name.to_owned(), name_of(part.data_type)))

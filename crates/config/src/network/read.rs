@@ -9,8 +9,9 @@ use super::check::check;
 use super::error::{Fault, NetworkError, Step, path_text};
 use super::model::NetworkFile;
 
-/// Maximum number of bytes of a network file. A SubDevice with many PDOs has about 10 KB.
-pub const MAX_NETWORK_BYTES: usize = 64 << 20;
+/// Maximum number of bytes of a network file. A thousand SubDevices take less than 2 MB; one byte of text can take a
+/// hundred bytes of memory.
+pub const MAX_NETWORK_BYTES: usize = 8 << 20;
 /// Maximum bytes of a message of the TOML reader.
 const MAX_MESSAGE: usize = 600;
 
@@ -29,7 +30,7 @@ impl NetworkFile {
             message,
         };
         if bytes.len() > MAX_NETWORK_BYTES {
-            return Err(failed(None, format!("expected at most {MAX_NETWORK_BYTES} bytes, got more")));
+            return Err(NetworkError::too_long(name, bytes.len() as u64));
         }
         let text = std::str::from_utf8(bytes).map_err(|error| {
             let line = 1 + bytes[..error.valid_up_to()].iter().filter(|byte| **byte == b'\n').count();

@@ -25,7 +25,7 @@ fn not_xml(text: &str, error: &Error) -> XmlError {
     }
     let at = error.pos();
     let mut reason = match error {
-        Error::DtdDetected => "a document type definition (DTD) is not read".to_owned(),
+        Error::DtdDetected => super::guard::NO_DOCUMENT_TYPE.to_owned(),
         other => other.to_string(),
     };
     // The message already contains the position at its beginning.

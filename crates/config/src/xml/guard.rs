@@ -4,6 +4,9 @@
 use super::error::{Place, XmlError, XmlProblem};
 use super::limits::{MAX_ATTRIBUTES, MAX_DEPTH};
 
+/// Why a file with a document type is refused.
+pub(super) const NO_DOCUMENT_TYPE: &str = "a document type definition (DTD), which can define entities, is not read";
+
 /// Refuses a text with more levels or attributes than such files have.
 pub(crate) fn check(text: &str) -> Result<(), XmlError> {
     let bytes = text.as_bytes();
@@ -18,6 +21,10 @@ pub(crate) fn check(text: &str) -> Result<(), XmlError> {
             find(bytes, begin + 9, b"]]>").map_or(bytes.len(), |end| end + 3)
         } else if rest.starts_with(b"<?") {
             find(bytes, begin + 2, b"?>").map_or(bytes.len(), |end| end + 2)
+        } else if rest.starts_with(b"<!DOCTYPE") {
+            // Its entities would be counted as elements.
+            let reason = NO_DOCUMENT_TYPE.to_owned();
+            return Err(XmlError::at(place(text, begin), XmlProblem::Syntax { reason }));
         } else {
             let tag = Tag::read(bytes, begin);
             namespaces += tag.namespaces;

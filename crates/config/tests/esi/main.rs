@@ -2,6 +2,7 @@
 //! files if they are beside the repository.
 
 mod bad_files;
+mod bounds;
 mod commands;
 mod differences;
 mod editions;

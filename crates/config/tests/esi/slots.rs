@@ -1,6 +1,6 @@
 //! Modules in slots: presets, classes, indices that shift.
 
-use ringcat_config::esi::{EsiError, NoReferences, Part, SlotIndex, parts, place_modules};
+use ringcat_config::esi::{EsiError, NoReferences, Part, PartsRoom, SlotIndex, parts, place_modules};
 
 use crate::reading::acme;
 
@@ -62,7 +62,8 @@ fn modules_that_do_not_fit_name_the_slot_and_the_line() {
 fn objects_have_the_parts_of_their_types_with_defaults_and_access() {
     let esi = acme();
     let dictionary = esi.devices[2].profiles[0].dictionary.as_ref().unwrap();
-    let of = |number: usize| parts(dictionary, &dictionary.objects[number]);
+    let room = PartsRoom::default;
+    let of = |number: usize| parts(dictionary, &dictionary.objects[number], &mut room()).unwrap();
     let settings = of(3);
     let short = |part: &Part| (part.sub_index, part.data_type, part.default.clone(), part.flags.access_word());
     assert_eq!(short(&settings[1]), (1, 0x01, vec![1], 0x13F));

@@ -37,7 +37,7 @@ pub(super) fn describe(
         description.pdos = of_device(device);
     }
     add_modules(device, &placed, &mut description)?;
-    description.objects = objects::objects(device, &placed, &description.pdos)?;
+    description.objects = objects::objects(esi, device, &placed, &description.pdos)?;
     description.controller_fmmus = device.info.fmmu_count.filter(|count| *count > 0);
     Ok(description)
 }
@@ -104,4 +104,47 @@ fn add_modules(
     description.pdos.retain(|pdo| of_file(pdo.index) && !is_new(pdo.index));
     description.pdos.extend(added);
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use ringcat_config::esi::read;
+
+    use super::*;
+
+    /// Objects with a value of 64 KiB each, from an index on.
+    fn profile(first: u32, objects: u32) -> String {
+        let object = |index: u32| {
+            format!("<Object><Index>{index}</Index><Name>o</Name><Type>T</Type><BitSize>524288</BitSize></Object>\n")
+        };
+        let objects: String = (first..first + objects).map(object).collect();
+        format!("<Profile><Dictionary><Objects>\n{objects}</Objects></Dictionary></Profile>")
+    }
+
+    /// A device with objects, and a module with more of them in its slot.
+    fn described(own: u32, of_module: u32) -> Result<DeviceDescription, String> {
+        let device = format!(
+            "<Device Physics=\"YY\"><Type ProductCode=\"1\" RevisionNo=\"1\">A1</Type><Name>n</Name>{}<Slots>\
+             <Slot MaxInstances=\"1\" MinInstances=\"1\"><Name>s</Name><ModuleIdent>7</ModuleIdent></Slot></Slots></Device>",
+            profile(0x2000, own)
+        );
+        let profile = profile(0x3000, of_module);
+        let module = format!("<Module><Type ModuleIdent=\"7\">M1</Type><Name>m</Name>{profile}</Module>");
+        let text = format!(
+            "<EtherCATInfo><Vendor><Id>71</Id></Vendor><Descriptions><Groups/><Devices>{device}</Devices>\
+             <Modules>{module}</Modules></Descriptions></EtherCATInfo>"
+        );
+        let esi = read("acme.xml", text.as_bytes()).expect("a description");
+        describe(&esi, &esi.devices[0], &[], "a")
+    }
+
+    // covers: esi-use, ES-72
+    #[test]
+    fn a_device_and_its_modules_have_room_for_values_together() {
+        let room = "too much for a device description: more than 16777216 bytes of values and names of the objects of a \
+                    device with its modules";
+        assert_eq!(described(120, 120).map(|it| it.objects.len()), Ok(240));
+        assert_eq!(described(300, 0).map(|_| ()), Err(format!("acme.xml:257: device \"A1\": {room}")));
+        assert_eq!(described(120, 200).map(|_| ()), Err(format!("acme.xml:258: device \"M1\": {room}")));
+    }
 }

@@ -1,5 +1,6 @@
 //! A description from a file, with the files to which it refers.
 
+use std::cell::RefCell;
 use std::fmt;
 use std::fs::{self, File};
 use std::io::{self, Read};
@@ -46,10 +47,16 @@ impl std::error::Error for EsiFailure {
 /// # Errors
 /// [`EsiFailure`]: a file cannot be read, or its content is wrong; the error names file, line and device.
 pub fn load(path: &Path) -> Result<Esi, EsiFailure> {
-    let bytes = bytes_of(path).map_err(|error| EsiFailure::Read { path: path.to_owned(), error })?;
-    let folder = Folder(path.parent().unwrap_or(Path::new("")));
+    load_noting(path).0
+}
+
+/// The same, with the paths of the files to which it refers, also of those that are not there.
+pub(super) fn load_noting(path: &Path) -> (Result<Esi, EsiFailure>, Vec<PathBuf>) {
+    let folder = Folder { path: path.parent().unwrap_or(Path::new("")), opened: RefCell::default() };
     let name = path.display().to_string();
-    read_with(&name, &bytes, &folder).map_err(|error| EsiFailure::Esi(Box::new(error)))
+    let bytes = bytes_of(path).map_err(|error| EsiFailure::Read { path: path.to_owned(), error });
+    let read = |bytes: Vec<u8>| read_with(&name, &bytes, &folder).map_err(|error| EsiFailure::Esi(Box::new(error)));
+    (bytes.and_then(read), folder.opened.into_inner())
 }
 
 /// Reads at most one byte more than the limit, also from a device or a pipe.
@@ -60,16 +67,20 @@ pub(super) fn bytes_of(path: &Path) -> io::Result<Vec<u8>> {
 }
 
 /// The folder of a description. File names are compared case-insensitively.
-struct Folder<'a>(&'a Path);
+struct Folder<'a> {
+    path: &'a Path,
+    /// What was opened, or is not there.
+    opened: RefCell<Vec<PathBuf>>,
+}
 
 impl References for Folder<'_> {
     fn open(&self, path: &str) -> Option<Vec<u8>> {
-        let mut at = self.0.to_owned();
+        let mut at = Some(self.path.to_owned());
         for part in path.split('/') {
-            let exact = at.join(part);
-            at = if exact.exists() { exact } else { named(&at, part)? };
+            at = at.and_then(|at| Some(at.join(part)).filter(|exact| exact.exists()).or_else(|| named(&at, part)));
         }
-        bytes_of(&at).ok()
+        self.opened.borrow_mut().push(at.clone().unwrap_or_else(|| self.path.join(path)));
+        bytes_of(&at?).ok()
     }
 }
 

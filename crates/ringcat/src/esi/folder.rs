@@ -1,6 +1,7 @@
 //! A folder of device descriptions with its index, which is kept between runs: only files that are new or have changed
 //! are read.
 
+use std::collections::HashMap;
 use std::fs::{self, Metadata};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
@@ -10,7 +11,7 @@ use std::time::UNIX_EPOCH;
 use ringcat_config::esi::Esi;
 use ringcat_config::esi::index::{Described, Index, IndexedFile, Stamp};
 
-use super::file::{EsiFailure, bytes_of, load};
+use super::file::{EsiFailure, bytes_of, load, load_noting};
 
 /// Folders below the folder, one in the other.
 const MAX_DEPTH: usize = 6;
@@ -47,11 +48,12 @@ impl EsiFolder {
         let bytes = kept.and_then(|kept| bytes_of(kept).ok());
         let before = bytes.and_then(|bytes| Index::from_text(std::str::from_utf8(&bytes).ok()?)).unwrap_or_default();
         let mut read = 0;
-        let files = found.into_iter().map(|(file, stamp)| {
-            let name = file.strip_prefix(path).unwrap_or(&file).to_string_lossy().into_owned();
-            before.unchanged(&name, stamp).cloned().unwrap_or_else(|| {
+        let stamps = Stamps::new(path, &found);
+        let files = found.iter().map(|(file, stamp)| {
+            let name = below(path, file);
+            before.unchanged(&name, *stamp, |other| stamps.now(other)).cloned().unwrap_or_else(|| {
                 read += 1;
-                entry(&file, &name, stamp)
+                entry(file, &name, *stamp, &stamps)
             })
         });
         let index = Index::new(files.collect());
@@ -118,12 +120,41 @@ fn stamp(metadata: &Metadata) -> Stamp {
     Stamp { bytes: metadata.len(), modified_ns: u64::try_from(since.as_nanos()).unwrap_or(u64::MAX) }
 }
 
-/// Reads a file for the index.
-fn entry(file: &Path, name: &str, stamp: Stamp) -> IndexedFile {
-    match load(file) {
-        Ok(esi) => IndexedFile::of(name, stamp, &esi),
-        Err(error) => IndexedFile::refused(name, stamp, &error.to_string()),
+/// A path as the index has it.
+fn below(folder: &Path, file: &Path) -> String {
+    file.strip_prefix(folder).unwrap_or(file).to_string_lossy().into_owned()
+}
+
+/// Sizes and times of the files to which descriptions refer. Most are descriptions themselves, and known already.
+struct Stamps<'a> {
+    folder: &'a Path,
+    /// By path in lower case, as references are found.
+    found: HashMap<String, Stamp>,
+}
+
+impl<'a> Stamps<'a> {
+    fn new(folder: &'a Path, found: &[(PathBuf, Stamp)]) -> Stamps<'a> {
+        let found = found.iter().map(|(file, stamp)| (below(folder, file).to_lowercase(), *stamp)).collect();
+        Stamps { folder, found }
     }
+
+    fn now(&self, path: &str) -> Option<Stamp> {
+        let known = self.found.get(&path.to_lowercase()).copied();
+        known.or_else(|| fs::metadata(self.folder.join(path)).ok().map(|metadata| stamp(&metadata)))
+    }
+}
+
+/// Reads a file for the index.
+fn entry(file: &Path, name: &str, stamp: Stamp, stamps: &Stamps<'_>) -> IndexedFile {
+    let (loaded, references) = load_noting(file);
+    let entry = match loaded {
+        Ok(esi) => IndexedFile::of(name, stamp, &esi),
+        // It belongs to a description, and has no devices of its own.
+        Err(EsiFailure::Esi(error)) if error.is_companion() => IndexedFile::of(name, stamp, &Esi::default()),
+        Err(error) => IndexedFile::refused(name, stamp, &error.to_string()),
+    };
+    let references = references.iter().map(|other| below(stamps.folder, other));
+    entry.with_references(references.map(|other| (other.clone(), stamps.now(&other))).collect())
 }
 
 /// Writes the index beside its place first, so that another process never reads a half of it.
@@ -199,6 +230,38 @@ mod tests {
         let folder = place.open();
         let found = folder.index().find(71, 3, 1, false).expect("it is described");
         assert_eq!(folder.load(&found).expect("it is there").devices[0].name.english(), "third");
+    }
+
+    // covers: esi-read
+    #[test]
+    fn files_that_a_description_refers_to_count_like_the_file_itself() {
+        let place = Place::new("referred");
+        let profile = |file: &str| format!("<Profile><DictionaryFile>{file}</DictionaryFile></Profile></Device>");
+        place.write("x.xml", &description(1, "first").replace("</Device>", &profile("D.xml")));
+        place.write("more/y.xml", &description(2, "second").replace("</Device>", &profile("sub/e.dict")));
+        let dictionary = "<EtherCATDict><Dictionary/></EtherCATDict>";
+        place.write("d.xml", "<EtherCATDict>\n<Dictionary><Objects><Object/></Objects></Dictionary></EtherCATDict>");
+        let opened = |place: &Place| {
+            let folder = place.open();
+            let refused: Vec<String> = folder.index().files().iter().filter_map(|file| file.refused.clone()).collect();
+            (folder.files_read(), folder.index().devices().count(), refused)
+        };
+        let (read, devices, refused) = opened(&place);
+        assert_eq!((read, devices, refused.len()), (3, 1, 1), "a dictionary is no description: {refused:?}");
+        assert!(refused[0].contains("x.xml:1: device \"A1\": a file that it refers to: "), "{refused:?}");
+        assert!(refused[0].contains("D.xml:2"), "{refused:?}");
+        assert_eq!(opened(&place), (0, 1, refused));
+        place.write("d.xml", dictionary);
+        assert_eq!(opened(&place), (2, 2, Vec::new()), "it and the file that refers to it");
+        assert_eq!(opened(&place), (0, 2, Vec::new()));
+        fs::create_dir_all(place.0.join("descriptions/more/sub")).expect("it is ours");
+        place.write("more/sub/e.dict", dictionary);
+        assert_eq!(opened(&place), (1, 2, Vec::new()), "one that was not there");
+        assert_eq!(opened(&place), (0, 2, Vec::new()));
+        place.write("more/sub/e.dict", "<EtherCATDict/>");
+        assert_eq!(opened(&place).1, 1, "a description that was accepted depends on it too");
+        fs::remove_file(place.0.join("descriptions/more/sub/e.dict")).expect("it is ours");
+        assert_eq!(opened(&place), (1, 2, Vec::new()));
     }
 
     // covers: esi-read

@@ -3,7 +3,9 @@
 
 use std::collections::BTreeMap;
 
-use ringcat_config::esi::{Device, Dictionary, Object as EsiObject, Part, PlacedModule, parts};
+use ringcat_config::esi::{
+    Device, Dictionary, Esi, EsiError, EsiProblem, Object as EsiObject, Part, PartsRoom, PlacedModule, parts,
+};
 use ringcat_sim::application::dictionary::{Access, Entry, Object, ObjectRole};
 use ringcat_sim::description::{PdoDescription, data_type};
 use ringcat_wire::mailbox::coe::AccessRights;
@@ -20,27 +22,35 @@ const DETECTED_IDENTS: u16 = 0xF050;
 /// Bytes of a number.
 const NUMBER: usize = 8;
 
-/// The objects of device and modules.
+/// The objects of device and modules. The error is that of an object whose values do not fit beside the others.
 pub(super) fn objects(
+    esi: &Esi,
     device: &Device,
     placed: &[PlacedModule<'_>],
     pdos: &[PdoDescription],
 ) -> Result<Vec<Object>, String> {
     let mut objects: BTreeMap<u16, Object> = BTreeMap::new();
-    let mut add = |dictionary: &Dictionary, object: &EsiObject| {
+    let mut room = PartsRoom::default();
+    let mut add = |dictionary: &Dictionary, object: &EsiObject, (file, kind): (&str, &str)| {
         let index = object.index.index;
         if !is_derived(index) {
-            objects.insert(index, converted(dictionary, object));
+            let file = dictionary.file.as_deref().unwrap_or(file);
+            let failed = |problem| EsiError::at_line(file, object.line, kind.trim(), problem).to_string();
+            objects.insert(index, converted(dictionary, object, &mut room).map_err(failed)?);
         }
+        Ok::<_, String>(())
     };
-    for dictionary in device.profiles.iter().filter_map(|profile| profile.dictionary.as_ref()) {
-        dictionary.objects.iter().for_each(|object| add(dictionary, object));
+    for dictionary in device.profiles.iter().filter_map(|profile| profile.dictionary.as_deref()) {
+        for object in &dictionary.objects {
+            add(dictionary, object, (&esi.file, &device.kind))?;
+        }
     }
-    for module in placed {
-        for dictionary in module.module.profiles.iter().filter_map(|profile| profile.dictionary.as_ref()) {
+    for placed in placed {
+        let module = placed.module;
+        for dictionary in module.profiles.iter().filter_map(|profile| profile.dictionary.as_deref()) {
             for object in &dictionary.objects {
-                let object = module.object(object).map_err(|error| error.to_string())?;
-                add(dictionary, &object);
+                let object = placed.object(object).map_err(|error| error.to_string())?;
+                add(dictionary, &object, (&module.file, &module.kind))?;
             }
         }
     }
@@ -70,11 +80,12 @@ fn idents(index: u16, name: &str, access: Access, placed: &[PlacedModule<'_>]) -
     Object { index, name: name.into(), role: ObjectRole::Plain, entries }
 }
 
-fn converted(dictionary: &Dictionary, object: &EsiObject) -> Object {
-    let parts = parts(dictionary, object);
+fn converted(dictionary: &Dictionary, object: &EsiObject, room: &mut PartsRoom) -> Result<Object, EsiProblem> {
+    let parts = parts(dictionary, object, room)?;
     let is_single = parts.len() == 1;
     let entries = parts.iter().map(|part| entry(part, is_single)).collect();
-    Object { index: object.index.index, name: object.name.english().into(), role: ObjectRole::Plain, entries }
+    let name = object.name.english().into();
+    Ok(Object { index: object.index.index, name, role: ObjectRole::Plain, entries })
 }
 
 fn entry(part: &Part, is_single: bool) -> Entry {

@@ -3,10 +3,12 @@
 use core::time::Duration;
 use std::path::Path;
 
-use super::SegmentError;
+use ringcat_wire::sii::SiiHeader;
+
 use super::described::{DescribedDevice, Sources};
 use super::format::{DeviceEntry, File, Place, duration, line};
 use super::services::services;
+use super::{SegmentError, read_at_most};
 use crate::catalogue;
 use crate::controller::Wander;
 use crate::description::{DcDescription, DeviceDescription, TransitionTimes};
@@ -14,6 +16,10 @@ use crate::network::Random;
 
 /// Maximum number of devices of a segment: station addresses are 16 bits wide.
 const MAX_DEVICES: usize = 65_535;
+/// Bytes of the objects and files of all devices, at most.
+const MAX_BYTES: usize = 1 << 30;
+/// Bytes of an entry besides its name and its value.
+const ENTRY_BYTES: usize = 64;
 /// Names with a special meaning as cable ends.
 pub(super) const RESERVED: [&str; 3] = ["main", "redundant", "none"];
 
@@ -35,6 +41,7 @@ pub(super) fn describe(
 ) -> Result<Vec<PlannedDevice>, SegmentError> {
     let mut plan: Vec<PlannedDevice> = Vec::new();
     let mut random = Random::new(seed);
+    let mut bytes = 0_usize;
     for (number, spanned) in file.device.iter().enumerate() {
         let entry = spanned.get_ref();
         let here = line(text, &spanned.span());
@@ -48,6 +55,13 @@ pub(super) fn describe(
         if count == 0 || plan.len().saturating_add(count) > MAX_DEVICES {
             let at = entry.count.as_ref().map_or(here, |count| line(text, &count.span()));
             return Err(error(format!("count: expected 1 to {MAX_DEVICES} devices in all, got {count}"), at));
+        }
+        bytes = bytes.saturating_add(size(&template).saturating_mul(count));
+        if bytes > MAX_BYTES {
+            return Err(error(
+                format!("expected objects of at most {MAX_BYTES} bytes in all devices, got {bytes}"),
+                here,
+            ));
         }
         for copy in 0..count {
             let mut description = template.clone();
@@ -65,6 +79,13 @@ pub(super) fn describe(
         }
     }
     Ok(plan)
+}
+
+/// Bytes of the objects and files of a device.
+fn size(description: &DeviceDescription) -> usize {
+    let entries = description.objects.iter().flat_map(|object| &object.entries);
+    let files = description.services.foe.files.iter().map(|(_, data)| data.len());
+    entries.map(|entry| ENTRY_BYTES + entry.name.len() + entry.value.len()).sum::<usize>() + files.sum::<usize>()
 }
 
 /// Name of a device; generated if the table has none.
@@ -105,8 +126,8 @@ fn template(entry: &DeviceEntry, name: &str, sources: &Sources<'_>) -> Result<De
         (None, Some(file)) => {
             let path = base_dir.join(file.get_ref());
             let place = || Some(file.span());
-            let image = std::fs::read(&path)
-                .map_err(|error| (format!("sii: {} cannot be read: {error}", path.display()), place()))?;
+            let image = read_at_most(&path, SiiHeader::MAX_EEPROM_BYTES as u64)
+                .map_err(|error| (format!("sii: {} {error}", path.display()), place()))?;
             DeviceDescription::from_sii(image, name)
                 .map_err(|error| (format!("sii: {}: {error}", path.display()), place()))?
         }

@@ -4,6 +4,7 @@ use core::net::Ipv4Addr;
 use std::path::Path;
 
 use super::format::{DeviceEntry, Place, duration};
+use super::read_at_most;
 use crate::description::{DeviceDescription, EoeDescription, EoeEnd, FoeDescription};
 
 /// Sizes of a mailbox: minimum for an SDO, maximum data of a datagram.
@@ -42,11 +43,7 @@ fn files(entry: &DeviceEntry, foe: &mut FoeDescription, base_dir: &Path) -> Resu
         let path = base_dir.join(file.get_ref());
         let error = |message: String| (format!("files: {}: {message}", path.display()), Some(file.span()));
         let name = path.file_name().and_then(|name| name.to_str()).ok_or_else(|| error("expected a file".into()))?;
-        let length = std::fs::metadata(&path).map_err(|cause| error(cause.to_string()))?.len();
-        if length > MAX_FILE_BYTES {
-            return Err(error(format!("expected at most {MAX_FILE_BYTES} bytes, got {length}")));
-        }
-        let data = std::fs::read(&path).map_err(|cause| error(cause.to_string()))?;
+        let data = read_at_most(&path, MAX_FILE_BYTES).map_err(error)?;
         foe.files.push((name.to_owned(), data));
     }
     foe.password = entry.password.unwrap_or(foe.password);

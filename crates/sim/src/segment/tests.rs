@@ -157,6 +157,28 @@ fn a_real_image_with_another_alias_has_a_valid_checksum() {
     assert_eq!((device.name.as_str(), again.alias, again.identity.serial), ("di-1", 300, 9));
 }
 
+#[test]
+fn files_that_never_end_and_files_that_are_too_long_are_refused() {
+    let directory = std::env::temp_dir().join(format!("ringcat-endless-{}", std::process::id()));
+    std::fs::create_dir_all(&directory).unwrap();
+    let long = std::fs::File::create(directory.join("long.bin")).unwrap();
+    long.set_len((8 << 20) + 1).unwrap();
+    for (text, expected) in [
+        ("sii = \"/dev/zero\"", "sii: /dev/zero cannot be read: it is no regular file"),
+        ("sii = \"long.bin\"", "long.bin is longer than 8388608 bytes"),
+        ("type = \"servo\"\nfiles = [\"/dev/zero\"]", "files: /dev/zero: cannot be read: it is no regular file"),
+        ("type = \"servo\"\nfiles = [\"long.bin\"]", "long.bin: is longer than 4194304 bytes"),
+    ] {
+        let error = Segment::from_toml(&format!("[[device]]\n{text}\n"), &directory).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+    long.set_len(4 << 20).unwrap();
+    let many = |count: u32| format!("[[device]]\ntype = \"servo\"\nfiles = [\"long.bin\"]\ncount = {count}\n");
+    let error = Segment::from_toml(&many(300), &directory).unwrap_err().to_string();
+    assert!(error.contains("expected objects of at most 1073741824 bytes in all devices"), "{error}");
+    std::fs::remove_dir_all(&directory).unwrap();
+}
+
 /// Texts of segment files with their errors; `{known}` is the list of all devices.
 const REFUSED: &[(&str, &str)] = &[
     ("[segment]\nspeed = 3", "line 2: unknown key \"speed\" in [segment]: expected one of name, seed, "),

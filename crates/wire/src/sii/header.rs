@@ -151,6 +151,8 @@ impl Default for SiiHeader {
 impl SiiHeader {
     /// Bytes of the fixed area.
     pub const LEN: usize = 128;
+    /// Bytes of the largest EEPROM that word 0x3E can express: 8 MiB.
+    pub const MAX_EEPROM_BYTES: usize = (u16::MAX as usize + 1) * 128;
 
     /// Decodes the fixed area; every pattern is valid.
     pub fn decode(bytes: &[u8; Self::LEN]) -> SiiHeader {

@@ -1,5 +1,8 @@
 //! Profiles and object dictionaries (protocol ES-20 to ES-24, ES-72 to ES-76).
 
+use std::sync::Arc;
+
+use super::Reference;
 use super::names::Names;
 use super::pdo::SlotIndex;
 
@@ -9,9 +12,9 @@ pub struct Profile {
     /// Number of each channel's profile, with the additional information.
     pub channels: Vec<(u32, Option<u32>)>,
     /// The dictionary.
-    pub dictionary: Option<Dictionary>,
+    pub dictionary: Option<Arc<Dictionary>>,
     /// File with the dictionary, as written.
-    pub dictionary_file: Option<String>,
+    pub dictionary_file: Option<Reference>,
 }
 
 /// An object dictionary with its own data types.
@@ -19,6 +22,8 @@ pub struct Profile {
 pub struct Dictionary {
     /// Line in the file.
     pub line: u32,
+    /// The file, if it is one of its own.
+    pub file: Option<Arc<str>>,
     /// Data types, sorted by name.
     pub data_types: Vec<DataType>,
     /// Objects in document order.

@@ -20,7 +20,8 @@ pub(super) fn dictionary(element: Element<'_>) -> Result<Dictionary, EsiError> {
     }
     data_types.dedup_by(|later, first| later.name == first.name);
     let objects = element.child("Objects").into_iter().flat_map(|objects| objects.children("Object"));
-    Ok(Dictionary { line: element.line(), data_types, objects: objects.map(object).collect::<Result<_, _>>()? })
+    let objects = objects.map(object).collect::<Result<_, _>>()?;
+    Ok(Dictionary { line: element.line(), file: None, data_types, objects })
 }
 
 fn data_type(element: Element<'_>) -> Result<DataType, EsiError> {

@@ -1,9 +1,11 @@
 //! Profiles of devices and modules.
 
+use std::sync::Arc;
+
 use super::dictionary::dictionary;
 use crate::esi::element::Element;
 use crate::esi::error::EsiError;
-use crate::esi::model::Profile;
+use crate::esi::model::{Profile, Reference};
 
 /// Profiles of a device or module.
 pub(super) fn profiles(parent: Element<'_>) -> Result<Vec<Profile>, EsiError> {
@@ -19,10 +21,11 @@ fn profile(element: Element<'_>) -> Result<Profile, EsiError> {
     for of in std::iter::once(element).chain(element.children("ChannelInfo")) {
         channels.extend(channel(of)?);
     }
-    let file = element.child("DictionaryFile").map(|file| file.raw().trim().to_owned());
+    let file = element.child("DictionaryFile");
+    let file = file.map(|file| Reference { line: file.line(), path: file.raw().trim().to_owned() });
     Ok(Profile {
         channels,
-        dictionary: element.child("Dictionary").map(dictionary).transpose()?,
-        dictionary_file: file.filter(|file| !file.is_empty()),
+        dictionary: element.child("Dictionary").map(dictionary).transpose()?.map(Arc::new),
+        dictionary_file: file.filter(|file| !file.path.is_empty()),
     })
 }

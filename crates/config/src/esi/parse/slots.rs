@@ -6,6 +6,7 @@ use super::profile::profiles;
 use crate::esi::element::Element;
 use crate::esi::error::EsiError;
 use crate::esi::model::{AllowedModule, Module, ModuleClass, Slot, SlotDistances, SlotGroupData, Slots, Transition};
+use crate::esi::modules::MAX_SLOTS;
 use crate::xml::shown;
 
 pub(super) fn slots(element: Element<'_>) -> Result<Slots, EsiError> {
@@ -52,10 +53,14 @@ fn slot(element: Element<'_>) -> Result<Slot, EsiError> {
         let name = class.text_of("Class").trim().to_owned();
         Ok(ModuleClass { class: name, vendor_id: class.number_of("VendorId")? })
     };
+    let least = element.number_in("MinInstances")?.unwrap_or(0);
+    if usize::from(least) > MAX_SLOTS {
+        element.note(format!("MinInstances {least}: a device has at most {MAX_SLOTS} slots"));
+    }
     Ok(Slot {
         line: element.line(),
         name: element.names("Name")?,
-        least: element.number_in("MinInstances")?.unwrap_or(0),
+        least,
         most: element.number_in("MaxInstances")?.unwrap_or(1),
         group: element.number_in("SlotGroup")?,
         distances: distances(element)?,

@@ -2,7 +2,7 @@
 
 use super::work::Work;
 use crate::esi::model::{Dictionary, Object, Profile};
-use crate::esi::values::{Part, parts};
+use crate::esi::values::{Part, PartsRoom, parts};
 
 /// An object's part with the line of the object.
 pub(super) struct Found {
@@ -44,10 +44,11 @@ impl Work<'_> {
 }
 
 fn dictionaries<'a>(profiles: impl Iterator<Item = &'a Profile>) -> impl Iterator<Item = &'a Dictionary> {
-    profiles.filter_map(|profile| profile.dictionary.as_ref())
+    profiles.filter_map(|profile| profile.dictionary.as_deref())
 }
 
 fn part_of(dictionary: &Dictionary, object: &Object, sub_index: u8, file: &str) -> Option<Found> {
-    let part = parts(dictionary, object).into_iter().find(|part| part.sub_index == sub_index)?;
+    let parts = parts(dictionary, object, &mut PartsRoom::default()).ok()?;
+    let part = parts.into_iter().find(|part| part.sub_index == sub_index)?;
     Some(Found { part, object: object.name.english().trim().to_owned(), line: object.line, file: file.to_owned() })
 }
