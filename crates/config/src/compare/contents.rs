@@ -55,8 +55,7 @@ impl Both<'_> {
         unfit.retain(|sync_manager, _| !differences_of_pdos.iter().any(|(named, _)| named == sync_manager));
         for (sync_manager, Lengths { declared, own }) in unfit {
             let text = format!(
-                "SM {sync_manager}: the PDOs of the file have {declared} bytes, those of the SubDevice {own}, and they \
-                 are not written"
+                "SM {sync_manager}: expected a length of {declared}, got {own}: the PDOs of the SubDevice cannot be written"
             );
             add(DifferenceKind::Pdos, true, text);
         }

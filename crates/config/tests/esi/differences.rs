@@ -76,7 +76,8 @@ fn as_described(device: &Device) -> SubDeviceInfo {
 fn pdos_that_only_one_of_both_assigns_are_differences() {
     let esi = acme();
     let device = &esi.devices[ANALOG];
-    let selection = select(&esi, device, &Choices::default()).unwrap_or_else(|error| panic!("{error}"));
+    let choices = Choices::default();
+    let selection = select(&esi, device, &choices).unwrap_or_else(|error| panic!("{error}"));
     let made = || {
         let from = SubDevice::from_esi(&selection, Duration::from_millis(1), 1033);
         from.unwrap_or_else(|error| panic!("{error}")).subdevice

@@ -195,14 +195,18 @@ fn pdos_that_differ_prevent_op_where_they_cannot_be_written() {
 
 // covers: network-file
 #[test]
-fn a_pdo_that_is_left_out_prevents_op_where_the_assignment_is_fixed() {
-    let network = file_of(&BUS, |file| {
-        let sync_manager = file.subdevice[ANALOG].sync_manager.iter_mut().rfind(|it| it.pdo.len() > 1);
-        drop(sync_manager.expect("it has several PDOs").pdo.pop());
-    });
-    let differences = judged(&network, &BUS);
+fn pdos_that_are_left_out_prevent_op_where_the_assignment_cannot_be_written() {
+    let types = ["coupler", "digital-output-16", "analog-input-4"];
+    let left = |at: usize, count: usize| {
+        file_of(&types, |file| {
+            let sync_manager = file.subdevice[at].sync_manager.iter_mut().rfind(|it| it.pdo.len() > 1);
+            sync_manager.expect("it has several PDOs").pdo.truncate(count);
+        })
+    };
+    let differences = judged(&left(1, 8), &types);
     assert_eq!(kinds(&differences), [(Pdos, true)], "{differences:#?}");
-    assert!(differences[0].text.contains("bytes"), "{}", differences[0].text);
+    assert!(differences[0].text.contains("SM 0: expected a length of 1, got 2"), "{}", differences[0].text);
+    assert_eq!(kinds(&judged(&left(2, 3), &types)), [], "it is written");
 }
 
 // covers: network-file
