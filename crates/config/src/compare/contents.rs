@@ -55,7 +55,8 @@ impl Both<'_> {
         unfit.retain(|sync_manager, _| !differences_of_pdos.iter().any(|(named, _)| named == sync_manager));
         for (sync_manager, Lengths { declared, own }) in unfit {
             let text = format!(
-                "SM {sync_manager}: expected a length of {declared}, got {own}: the PDOs of the SubDevice cannot be written"
+                "SM {sync_manager}: expected a length of {declared}, got {own}: the PDOs of the SubDevice cannot be \
+                 written"
             );
             add(DifferenceKind::Pdos, true, text);
         }
