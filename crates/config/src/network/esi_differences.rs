@@ -13,8 +13,8 @@ const ENTRY_BITS: u16 = 248;
 
 impl SubDevice {
     /// The differences to a description, each once: its revision, mailboxes, SyncManagers and operation modes of the
-    /// clock, entries of PDOs, PDOs that only one of them assigns. `info` is what the scan found, `modules` are those in
-    /// the slots. A SubDevice with slots may have PDOs of unknown modules.
+    /// clock, entries of PDOs, PDOs that only one of them assigns. `info` is what the scan found, `modules` are those
+    /// in the slots. A SubDevice with slots may have PDOs of unknown modules.
     pub fn differences_to_esi(
         &self,
         device: &Device,

@@ -74,8 +74,8 @@ fn a_single_word_of_the_revision_is_a_rule_of_the_declaration() {
 #[test]
 fn both_words_of_a_revision_are_the_whole_one_and_masked_words_are_sent() {
     let lookup = "<Data>00010d000000</Data><Cnt>1</Cnt></InitCmd><InitCmd><Transition>IP</Transition>\
-                  <Comment>check high word</Comment><Cmd>1</Cmd><Adp>0</Adp><Ado>1288</Ado><Data>0000</Data><Cnt>1</Cnt>\
-                  <Validate><Data>0200</Data><Timeout>100</Timeout></Validate></InitCmd><InitCmd>\
+                  <Comment>check high word</Comment><Cmd>1</Cmd><Adp>0</Adp><Ado>1288</Ado><Data>0000</Data>\
+                  <Cnt>1</Cnt><Validate><Data>0200</Data><Timeout>100</Timeout></Validate></InitCmd><InitCmd>\
                   <Transition>IP</Transition><Comment>look up low word</Comment><Cmd>2</Cmd><Adp>0</Adp>\
                   <Ado>1282</Ado><Data>00010c000000</Data>";
     let read = |low: &str| {
