@@ -8,6 +8,9 @@ mod align;
 mod cables;
 mod contents;
 mod difference;
+mod marks;
+mod order;
+mod process_data;
 
 use std::collections::BTreeSet;
 
@@ -70,7 +73,7 @@ impl Configuration {
                     differences.push(differs(config, true, &error));
                 }
                 Resolution::Extra { info } if reported.contains(&found[info].position) => {}
-                Resolution::Extra { info } => differences.push(additional(&found[info])),
+                Resolution::Extra { info } => differences.push(additional(&found[info], false)),
             }
         }
         differences
@@ -84,11 +87,20 @@ impl Configuration {
         let names = self.names();
         let mut differences = Vec::new();
         let mut pairs = Vec::new();
-        for place in align::align(self, found, stated) {
+        let places = align::align(self, found, stated);
+        let marks = marks::Marks::of(self, found, &places);
+        let order = order::Order::of(self, found, &places);
+        for place in places {
             match place {
                 Place::Both { config, info, moved } => {
-                    if moved {
-                        differences.push(order(config, &names, &found[info]));
+                    if let Some(text) = order.text(config, &names).filter(|_| moved) {
+                        differences.push(Difference {
+                            subdevice: Some(SubDeviceId(config)),
+                            position: Some(found[info].position),
+                            kind: DifferenceKind::Order,
+                            prevents_op: marks.fails(config),
+                            text,
+                        });
                     }
                     let both = contents::Both {
                         config,
@@ -97,12 +109,13 @@ impl Configuration {
                         stated: stated.get(config),
                         info: &found[info],
                         firmware: firmware.get(info).and_then(Option::as_deref),
+                        fails: marks.fails(config),
                     };
                     both.compare(&mut differences);
                     pairs.push((config, info));
                 }
-                Place::Missing { config } => differences.push(self.missing(config, &names)),
-                Place::Additional { info } => differences.push(additional(&found[info])),
+                Place::Missing { config } => differences.push(self.missing(config, &names, marks.fails(config))),
+                Place::Additional { info } => differences.push(additional(&found[info], marks.shifts(info))),
             }
         }
         if !differences.iter().any(|difference| difference.kind == DifferenceKind::Order) {
@@ -111,7 +124,7 @@ impl Configuration {
         differences
     }
 
-    fn missing(&self, config: usize, names: &[String]) -> Difference {
+    fn missing(&self, config: usize, names: &[String], fails: bool) -> Difference {
         let declared = &self.declaration.subdevices[config];
         let (expected, place) = (&declared.expected, declared.address);
         let device = match (expected.vendor_id, expected.product_code) {
@@ -123,35 +136,19 @@ impl Configuration {
             subdevice: Some(SubDeviceId(config)),
             position: None,
             kind: DifferenceKind::Missing,
-            prevents_op: !declared.optional,
+            prevents_op: !declared.optional || fails,
             text: format!("\"{}\" ({place}{device}) is missing{optional}", names[config]),
         }
     }
 }
 
-fn order(config: usize, names: &[String], info: &SubDeviceInfo) -> Difference {
-    Difference {
-        subdevice: Some(SubDeviceId(config)),
-        position: Some(info.position),
-        kind: DifferenceKind::Order,
-        prevents_op: true,
-        text: format!("\"{}\" is at position {}, the file has it at another place", names[config], info.position),
-    }
-}
-
-fn additional(info: &SubDeviceInfo) -> Difference {
+fn additional(info: &SubDeviceInfo, prevents_op: bool) -> Difference {
     let SubDeviceInfo { position, name, identity, .. } = info;
     let text = format!(
         "position {position} \"{name}\" is not in the file: vendor {:#010x}, product {:#010x}",
         identity.vendor_id, identity.product_code
     );
-    Difference {
-        subdevice: None,
-        position: Some(*position),
-        kind: DifferenceKind::Additional,
-        prevents_op: false,
-        text,
-    }
+    Difference { subdevice: None, position: Some(*position), kind: DifferenceKind::Additional, prevents_op, text }
 }
 
 /// Position of a SubDevice with another identity than expected.

@@ -24,6 +24,7 @@ mod sync_managers;
 mod transitions;
 mod whole_bus;
 
+pub(crate) use identity::{HIGH_WORD, LOW_WORD};
 pub(crate) use subdevice::states;
 
 use ringcat_engine::main_device::Declaration;

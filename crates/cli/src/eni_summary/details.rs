@@ -1,7 +1,7 @@
 //! The details of each SubDevice: SyncManagers, PDOs, start-up commands, places in the image.
 
-use ringcat::config::Configuration;
 use ringcat::config::eni::Eni;
+use ringcat::config::{Configuration, ObjectNames};
 use ringcat::{SubDeviceId, SyncSignals};
 
 use super::words::{action, one_line, role, side, time};
@@ -45,6 +45,8 @@ fn of_subdevice(index: usize, model: &Eni, configuration: &Configuration, lines:
     if let Some(protocols) = protocols.filter(|protocols| !protocols.is_empty()) {
         lines.push(format!("  mailbox protocols: {}", one_line(&protocols)));
     }
+    let mut names = ObjectNames::default();
+    names.add_eni(&model.subdevices[index]);
     match &config.declared {
         None => lines.push("  SyncManagers as its SII says".to_owned()),
         Some(declared) => {
@@ -61,9 +63,11 @@ fn of_subdevice(index: usize, model: &Eni, configuration: &Configuration, lines:
                     sm.index
                 ));
                 for pdo in &sm.pdos {
+                    let name = names.object(pdo.index).map(|name| format!(" \"{}\"", one_line(name)));
+                    let name = name.unwrap_or_default();
                     let bits: u32 = pdo.entries.iter().flatten().map(|entry| u32::from(entry.bit_length)).sum();
                     let entries = pdo.entries.as_ref().map_or(0, Vec::len);
-                    lines.push(format!("    PDO {:#06x}  {bits} bits, {entries} entries", pdo.index));
+                    lines.push(format!("    PDO {:#06x}{name}  {bits} bits, {entries} entries", pdo.index));
                 }
             }
         }

@@ -43,11 +43,11 @@ pub fn fill(file: &mut NetworkFile, bus: &Bus, descriptions: &mut Descriptions) 
             continue;
         };
         named.described += 1;
-        for difference in subdevice.differences_to_esi(described.device()) {
+        let modules = described.modules(info, idents);
+        for difference in subdevice.differences_to_esi(described.device(), info, &modules) {
             let (name, path) = (&subdevice.name, &described.path);
             warn(format!("position {position} \"{name}\": {difference} ({path}): the device has priority"));
         }
-        let modules = described.modules(info, idents);
         named.modules += modules.len();
         named.names += subdevice.name_from_esi(described.device(), &modules, LANGUAGE);
     }

@@ -111,7 +111,7 @@ const fn by_position(config: &SubDeviceConfig) -> bool {
 }
 
 /// The position of a SubDevice that is declared by it.
-fn position(config: &SubDeviceConfig) -> usize {
+pub(super) fn position(config: &SubDeviceConfig) -> usize {
     match config.address {
         ConfigAddress::Position(position) | ConfigAddress::Alias { alias: 0, offset: position } => position.into(),
         _ => usize::MAX,

@@ -8,6 +8,7 @@ use ringcat_engine::info::{PdoInfo, SubDeviceInfo};
 use ringcat_engine::plan;
 
 use super::difference::{Difference, DifferenceKind, Stated};
+use super::process_data::{self, Lengths};
 
 /// A SubDevice of the file and the one that was found.
 pub(super) struct Both<'a> {
@@ -23,6 +24,8 @@ pub(super) struct Both<'a> {
     pub(super) info: &'a SubDeviceInfo,
     /// Version of its firmware, if it was read.
     pub(super) firmware: Option<&'a str>,
+    /// The activation fails because of its place or its identity.
+    pub(super) fails: bool,
 }
 
 impl Both<'_> {
@@ -38,13 +41,24 @@ impl Both<'_> {
                 info.mailbox.as_ref().map(|it| [(it.receive_offset, it.receive_size), (it.send_offset, it.send_size)]);
             if got != Some(expected) {
                 let text = format!("expected mailboxes {}, got {}", buffers(Some(expected)), buffers(got));
-                add(DifferenceKind::Mailbox, false, text);
+                // An ENI has its own SyncManagers, which are written; a network file takes those of the SII.
+                add(DifferenceKind::Mailbox, declared.declared.is_some(), text);
             }
         }
-        for pdo in pdos(declared) {
-            if let Some(text) = pdo_difference(pdo, info) {
-                add(DifferenceKind::Pdos, false, text);
-            }
+        let mut unfit = process_data::unfit(declared, info);
+        let differences_of_pdos: Vec<(u8, String)> = process_data::pdos(declared)
+            .filter_map(|(sync_manager, pdo)| Some((sync_manager, pdo_difference(pdo, info)?)))
+            .collect();
+        for (sync_manager, text) in &differences_of_pdos {
+            add(DifferenceKind::Pdos, unfit.contains_key(sync_manager), text.clone());
+        }
+        unfit.retain(|sync_manager, _| !differences_of_pdos.iter().any(|(named, _)| named == sync_manager));
+        for (sync_manager, Lengths { declared, own }) in unfit {
+            let text = format!(
+                "SM {sync_manager}: expected a length of {declared}, got {own}: the PDOs of the SubDevice cannot be \
+                 written"
+            );
+            add(DifferenceKind::Pdos, true, text);
         }
         if let Err(error) = plan(declared, info) {
             add(DifferenceKind::ProcessData, true, error.to_string());
@@ -66,7 +80,7 @@ impl Both<'_> {
             let kind = DifferenceKind::of_field(mismatch.field);
             let IdentityMismatch { field, expected, got, .. } = mismatch;
             let text = format!("expected {field} {expected:#010x}, got {got:#010x}");
-            differences.push(self.difference(kind, true, text));
+            differences.push(self.difference(kind, self.fails, text));
             return kind == DifferenceKind::Device;
         }
         if let Some((vendor, product)) = stated.device
@@ -110,13 +124,6 @@ fn mailbox(declared: &SubDeviceConfig, stated: Option<&Stated>) -> Option<[(u16,
 fn buffers(mailbox: Option<[(u16, u16); 2]>) -> String {
     let Some([(out, out_length), (back, back_length)]) = mailbox else { return "none".to_owned() };
     format!("{out:#06x} ({out_length} bytes) and {back:#06x} ({back_length} bytes)")
-}
-
-/// All PDOs of a declaration.
-fn pdos(declared: &SubDeviceConfig) -> impl Iterator<Item = &PdoMapping> {
-    let of_file = declared.declared.iter().flatten().flat_map(|it| &it.pdos);
-    let assigned = declared.pdos.iter().flatten().flat_map(|it| &it.pdos);
-    of_file.chain(assigned.filter(|_| declared.declared.is_none()))
 }
 
 /// How a PDO differs from the one that the SubDevice describes. A SubDevice that describes no PDO at all has no

@@ -7,6 +7,7 @@ use ringcat_wire::al::AlState;
 
 use super::error::ExportError;
 use crate::configuration::Configuration;
+use crate::follow::{HIGH_WORD, LOW_WORD};
 
 pub(super) fn check(configuration: &Configuration) -> Result<(), ExportError> {
     let declaration = &configuration.declaration;
@@ -48,8 +49,8 @@ fn problem(config: &SubDeviceConfig) -> Option<(&'static str, String)> {
         return Some(("place", reason.to_owned()));
     }
     let expected = &config.expected;
-    if expected.minimum_revision.is_some() || (expected.revision.is_some() && expected.revision_mask != u32::MAX) {
-        let reason = "the commands of an ENI compare a revision for equality only";
+    if expected.revision.is_some() && ![u32::MAX, LOW_WORD, HIGH_WORD].contains(&expected.revision_mask) {
+        let reason = "the commands of an ENI compare the whole revision, its low word or its high word";
         return Some(("comparison of the revision", reason.to_owned()));
     }
     if expected.identification.is_some() {

@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use ringcat_engine::config::{
-    DeclaredSyncManager, RegisterAccess, RegisterCommand, StartupAction, StartupCommand, SubDeviceConfig,
+    DeclaredSyncManager, Expected, RegisterAccess, RegisterCommand, StartupAction, StartupCommand, SubDeviceConfig,
     Transition as EngineTransition,
 };
 use ringcat_wire::address::RegisterAddress;
@@ -14,6 +14,7 @@ use ringcat_wire::register::{Fmmu, SyncManager, map};
 
 use super::clocks;
 use crate::eni::{Datagram, EcatCommand, Place, Requires, Target, Transition, Validate};
+use crate::follow::{HIGH_WORD, LOW_WORD};
 
 /// Repetitions of a command with a wrong working counter.
 const RETRIES: u16 = 3;
@@ -217,19 +218,7 @@ impl Commands {
         let set = self.command(first, "set physical address", Command::Apwr, map::STATION_ADDRESS, station, None);
         self.list.push(set);
         self.write(first, "assign EEPROM to ECAT", map::SII_CONFIGURATION, vec![0]);
-        let expected = &config.expected;
-        let words = [
-            ("check vendor id", 0x0008_u32, expected.vendor_id),
-            ("check product code", 0x000A, expected.product_code),
-            ("check revision number", 0x000C, expected.revision),
-            ("check serial number", 0x000E, expected.serial),
-        ];
-        for (comment, word, value) in words {
-            let Some(value) = value else { continue };
-            self.write(first, comment, map::SII_CONTROL, [&READ[..], &word.to_le_bytes()].concat());
-            let validate = Validate { data: value.to_le_bytes().to_vec(), mask: None, timeout_ms: EEPROM_MS };
-            self.check(first, comment, map::SII_DATA, validate);
-        }
+        self.identity(first, &config.expected);
         let watchdogs = [
             ("set watchdog divider", map::WATCHDOG_DIVIDER, config.watchdog_divider),
             ("set PDI watchdog", map::WATCHDOG_TIME_PDI, config.pdi_watchdog_intervals),
@@ -239,6 +228,29 @@ impl Commands {
             if let Some(value) = value {
                 self.write(&[Ip], comment, ado, value.to_le_bytes().to_vec());
             }
+        }
+    }
+
+    /// The checks of the identity. Of a revision the whole number is compared, or a word (protocol ES-121).
+    fn identity(&mut self, first: &[Transition], expected: &Expected) {
+        let whole = |value: Option<u32>| value.map(|value| value.to_le_bytes().to_vec());
+        let word = |value: u32| (value as u16).to_le_bytes().to_vec();
+        let revision = match expected.revision_mask {
+            LOW_WORD => ("check revision number (lo word)", 0x000C, expected.revision.map(word)),
+            HIGH_WORD => ("check revision number (hi word)", 0x000D, expected.revision.map(|value| word(value >> 16))),
+            _ => ("check revision number", 0x000C, whole(expected.revision)),
+        };
+        let words = [
+            ("check vendor id", 0x0008_u32, whole(expected.vendor_id)),
+            ("check product code", 0x000A, whole(expected.product_code)),
+            revision,
+            ("check serial number", 0x000E, whole(expected.serial)),
+        ];
+        for (comment, word, value) in words {
+            let Some(data) = value else { continue };
+            self.write(first, comment, map::SII_CONTROL, [&READ[..], &word.to_le_bytes()].concat());
+            let validate = Validate { data, mask: None, timeout_ms: EEPROM_MS };
+            self.check(first, comment, map::SII_DATA, validate);
         }
     }
 

@@ -49,6 +49,11 @@ fn of_clocks(clocks: &ClockConfig, left_out: &mut Vec<LeftOut>) {
 
 fn of_subdevice(index: usize, config: &SubDeviceConfig, left_out: &mut Vec<LeftOut>) {
     let mut add = |what: &str, reason: &str| left_out.push(LeftOut::new(index, what, reason));
+    if let Some(minimum) = config.expected.minimum_revision {
+        let rest = if config.expected.revision.is_some() { "the other word is compared" } else { "none is compared" };
+        let reason = format!("commands cannot compare with a lowest revision, {minimum:#010x}: {rest}");
+        add("check_revision", &reason);
+    }
     if config.optional && config.group.is_none() {
         add("optional", "outside of hot connect groups every SubDevice of an ENI has to be there");
     }

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use ringcat_engine::config::{StartupAction, StartupCommand, SubDeviceConfig};
+use ringcat_engine::config::{Expected, StartupAction, StartupCommand, SubDeviceConfig};
 use ringcat_engine::main_device::{Declaration, DomainConfig};
 
 use super::error::ExportError;
@@ -57,7 +57,7 @@ fn different(expected: &SubDeviceConfig, got: &SubDeviceConfig) -> Option<&'stat
     let optional = |of: &SubDeviceConfig| of.optional && of.group.is_some();
     let found = [
         ("place", a.address != b.address),
-        ("expected identity", a.expected != b.expected),
+        ("expected identity", compared(a) != b.expected),
         ("group", a.group != b.group || optional(a) != optional(b)),
         ("SyncManagers", a.declared != b.declared),
         ("mailboxes of BOOT", a.declared_bootstrap != b.declared_bootstrap),
@@ -71,6 +71,16 @@ fn different(expected: &SubDeviceConfig, got: &SubDeviceConfig) -> Option<&'stat
         ("time limits of state changes", limits_differ),
     ];
     found.into_iter().find(|(_, differs)| *differs).map(|(what, _)| what)
+}
+
+/// The identity without the lowest revision, which the file leaves to the MainDevice (protocol ES-121).
+fn compared(config: &SubDeviceConfig) -> Expected {
+    let mut expected = config.expected;
+    expected.minimum_revision = None;
+    if expected.revision.is_none() {
+        expected.revision_mask = u32::MAX;
+    }
+    expected
 }
 
 /// In the order of sending. Commands to registers have no time limit in a file.

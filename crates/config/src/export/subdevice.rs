@@ -33,6 +33,7 @@ pub(super) fn subdevice(
         None => init_commands::raw(config, own),
     };
     let expected = &config.expected;
+    let revision = expected.revision.or(expected.minimum_revision);
     Ok(SubDevice {
         name: facts.name.clone(),
         station: facts.station,
@@ -40,7 +41,7 @@ pub(super) fn subdevice(
         physics: one_line(&details.physics),
         vendor_id: Some(expected.vendor_id.or(details.vendor_id).unwrap_or_default()),
         product_code: Some(expected.product_code.or(details.product_code).unwrap_or_default()),
-        revision: Some(expected.revision.or(details.revision).unwrap_or_default()),
+        revision: Some(revision.or(details.revision).unwrap_or_default()),
         serial: Some(expected.serial.or(details.serial).unwrap_or_default()),
         process_data: process_data::of_subdevice(whole, index, details)?,
         mailbox: mailbox::mailbox(config, facts, details, &order),

@@ -38,6 +38,9 @@ const WORD_VENDOR: u32 = 0x0008;
 const WORD_PRODUCT: u32 = 0x000A;
 const WORD_REVISION: u32 = 0x000C;
 const WORD_SERIAL: u32 = 0x000E;
+/// Words of a revision, as masks of it.
+pub(crate) const LOW_WORD: u32 = 0x0000_FFFF;
+pub(crate) const HIGH_WORD: u32 = 0xFFFF_0000;
 
 /// The values that commands compare, in order, and whether all bits are compared.
 pub(super) fn marks(commands: &[EcatCommand]) -> Vec<(Mark, bool, Place)> {
@@ -93,13 +96,17 @@ pub(super) fn expected(eni: &Eni, index: usize, complete: bool) -> Result<Expect
         expected.product_code = subdevice.product_code.filter(|code| *code != 0);
         return Ok(expected);
     }
+    let mut revision = (0_u32, 0_u32);
     let identify = subdevice.hot_connect.iter().flat_map(|group| marks(&group.identify));
     for (mark, whole, place) in marks(&subdevice.init_commands).into_iter().chain(identify) {
+        if let Some((mask, value)) = part_of_revision(&mark).filter(|_| whole) {
+            revision = (revision.0 & !mask | value, revision.1 | mask);
+            continue;
+        }
         let Mark::Eeprom { word, value } = mark else { continue };
         let (field, what, said) = match word {
             WORD_VENDOR => (&mut expected.vendor_id, "the compared vendor id", subdevice.vendor_id),
             WORD_PRODUCT => (&mut expected.product_code, "the compared product code", subdevice.product_code),
-            WORD_REVISION => (&mut expected.revision, "the compared revision", None),
             WORD_SERIAL => (&mut expected.serial, "the compared serial number", None),
             _ => continue,
         };
@@ -112,19 +119,36 @@ pub(super) fn expected(eni: &Eni, index: usize, complete: bool) -> Result<Expect
         }
         *field = Some(value);
     }
+    if let (value, mask @ 1..) = revision {
+        // A word that is not compared is the one of Info, which describes the device.
+        expected.revision = Some(subdevice.revision.unwrap_or_default() & !mask | value);
+        expected.revision_mask = mask;
+    }
     Ok(expected)
 }
 
-/// Whether a command compares an EEPROM value that is not in [`expected`]: a part of a number (TwinCAT compares single
-/// words of the revision), or another word. Such commands are sent unchanged.
+/// The bits of a revision that are compared, and their value: the whole one or a word of it (protocol ES-121).
+fn part_of_revision(mark: &Mark) -> Option<(u32, u32)> {
+    match *mark {
+        Mark::Eeprom { word: WORD_REVISION, value } => Some((u32::MAX, value)),
+        Mark::EepromWord { word: WORD_REVISION, value } => Some((LOW_WORD, value.into())),
+        Mark::EepromWord { word, value } if word == WORD_REVISION + 1 => Some((HIGH_WORD, u32::from(value) << 16)),
+        _ => None,
+    }
+}
+
+/// Whether a command compares an EEPROM value that is not in [`expected`]: another word, a part of a word. Such
+/// commands are sent unchanged.
 pub(super) fn is_sent(command: &EcatCommand, address: Option<&EcatCommand>) -> bool {
     let Target::Register { ado, .. } = command.datagram.target else { return false };
     let pair: Vec<EcatCommand> = address.into_iter().chain([command]).cloned().collect();
     let is_whole = |(mark, whole, _): &(Mark, bool, Place)| {
-        let known = [WORD_VENDOR, WORD_PRODUCT, WORD_REVISION, WORD_SERIAL];
-        *whole && matches!(mark, Mark::Eeprom { word, .. } if known.contains(word))
+        let known = [WORD_VENDOR, WORD_PRODUCT, WORD_SERIAL];
+        let is_number = matches!(mark, Mark::Eeprom { word, .. } if known.contains(word));
+        *whole && (is_number || part_of_revision(mark).is_some())
     };
-    ado == map::SII_DATA && command.validate.is_some() && !marks(&pair).iter().all(is_whole)
+    let Some(validate) = command.validate.as_ref().filter(|_| ado == map::SII_DATA) else { return false };
+    validate.data.len() % 2 == 1 || !marks(&pair).iter().all(is_whole)
 }
 
 /// Whether a command sets the EEPROM address of the next read.

@@ -39,6 +39,7 @@ pub(super) fn check(file: &NetworkFile) -> Checked {
     redundancy(file, &names)?;
     groups(file)?;
     positions(file)?;
+    cables(file)?;
     for (index, subdevice) in file.subdevice.iter().enumerate() {
         of_subdevice(file, index, subdevice, &names).map_err(|fault| {
             let mut path = vec!["subdevice".into(), index.into()];
@@ -104,6 +105,20 @@ fn is_known(names: &BTreeMap<&str, usize>, name: &str, path: Vec<Step>) -> Check
             message: format!("expected the name of a SubDevice of the file, got \"{}\"", name.escape_debug()),
         }),
     }
+}
+
+/// A port has one cable. Groups and optional SubDevices may take turns at it.
+fn cables(file: &NetworkFile) -> Checked {
+    let mut known = BTreeMap::new();
+    let fixed = file.subdevice.iter().enumerate().filter(|(_, it)| it.group.is_none() && !it.optional);
+    for (index, subdevice) in fixed {
+        let Some(into) = &subdevice.plugged_into else { continue };
+        if let Some(first) = known.insert((into.subdevice.as_str(), into.port), index) {
+            let message = format!("subdevice[{first}] is plugged into this port too");
+            return fault(["subdevice".into(), index.into(), "plugged_into".into()], message);
+        }
+    }
+    Ok(())
 }
 
 fn clocks(file: &NetworkFile, names: &BTreeMap<&str, usize>) -> Checked {

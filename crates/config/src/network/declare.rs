@@ -25,10 +25,8 @@ use super::write::next_position;
 use crate::compare::Stated;
 use crate::configuration::{Configuration, ImageArea, ProcessImage, SubDeviceFacts, Variable};
 use crate::eni::Port;
+use crate::follow::{HIGH_WORD, LOW_WORD};
 
-/// Halves of a revision.
-const LOW_WORD: u32 = 0x0000_FFFF;
-const HIGH_WORD: u32 = 0xFFFF_0000;
 /// Parts of the name of a variable are separated by this.
 const SEPARATOR: char = '.';
 

@@ -3,6 +3,7 @@
 mod commands;
 mod networks;
 mod refusals;
+mod revisions;
 mod round_trips;
 mod schema;
 

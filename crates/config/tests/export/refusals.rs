@@ -1,6 +1,6 @@
 //! What an ENI cannot express: refused with SubDevice, setting and reason, or listed.
 
-use ringcat_config::network::model::{CheckRevision, Target};
+use ringcat_config::network::model::Target;
 use ringcat_config::network::{NetworkFile, Time};
 use ringcat_config::{Configuration, ExportDetails, ExportOptions, export};
 use ringcat_engine::config::{RegisterAccess, RegisterCommand, StartupAction, StartupCommand, Transition};
@@ -26,11 +26,6 @@ fn settings_without_which_another_network_results_are_refused_by_name() {
     let expect = |got: String, expected: &str| assert!(got.starts_with(expected), "{got}");
     let drive = "SubDevice 1 \"Drive\": ";
     expect(of_drive(|it| it.target = Target::Preop), &format!("{drive}target: PREOP"));
-    expect(
-        of_drive(|it| it.check_revision = CheckRevision::EqualOrGreater),
-        &format!("{drive}comparison of the revision"),
-    );
-    expect(of_drive(|it| it.check_revision = CheckRevision::LowEqual), &format!("{drive}comparison of the revision"));
     expect(of_drive(|it| it.check_identification = Some(3)), &format!("{drive}identification"));
     expect(of_drive(|it| it.alias = Some(7)), &format!("{drive}place: an alias"));
     expect(of_drive(|it| it.sync_manager[0].start = None), &format!("{drive}SyncManager 2: an ENI needs its `start`"));
@@ -55,6 +50,15 @@ fn commands_that_the_maindevice_sends_itself_are_refused_as_start_up_commands() 
     configuration.declaration.subdevices[COUPLER].startup.push(StartupCommand::new(Transition::Ps, action));
     let error = export(&configuration, &ExportDetails::default(), &ExportOptions::default()).expect_err("not sent");
     assert!(error.to_string().contains("start-up commands") || error.what == "the written file", "{error}");
+}
+
+// covers: ES-121, eni-run
+#[test]
+fn bits_of_a_revision_that_are_no_word_of_it_are_refused() {
+    let mut configuration = network(CELL).configuration();
+    configuration.declaration.subdevices[DRIVE].expected.revision_mask = 0x00FF_0000;
+    let error = export(&configuration, &ExportDetails::default(), &ExportOptions::default()).expect_err("not a word");
+    assert!(error.to_string().starts_with("SubDevice 1 \"Drive\": comparison of the revision: "), "{error}");
 }
 
 // covers: eni-run

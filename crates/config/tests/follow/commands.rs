@@ -50,23 +50,61 @@ fn only_what_the_commands_compare_is_expected() {
     assert_eq!(terminal, ringcat_engine::config::Expected::default(), "nothing is compared, nothing is expected");
 }
 
-// covers: eni-image
+// covers: ES-121, eni-image
 #[test]
-fn a_single_word_of_the_revision_is_compared_as_in_the_file() {
-    let lookup = ("<Data>000108000000</Data>", "<Data>00010c000000</Data>");
-    let check = ("<Data>02000000</Data>", "<Data>0000</Data>");
-    let configuration = changed(&[lookup, check]);
-    let coupler = &configuration.declaration.subdevices[0];
-    assert_eq!(coupler.expected.revision, None, "the upper word is not compared");
-    let commands = registers(coupler);
-    assert_eq!(commands.len(), 2, "the address, then the comparison");
-    assert_eq!(commands[0].1.address, RegisterAddress(0x0502));
-    assert_eq!(commands[0].1.access, RegisterAccess::Write(vec![0x00, 0x01, 0x0C, 0, 0, 0]));
-    let limit = Duration::from_millis(100);
-    assert_eq!(commands[1].1.access, RegisterAccess::Check { data: vec![0, 0], mask: None, limit });
-    let whole = changed(&[lookup]);
-    assert_eq!(whole.declaration.subdevices[0].expected.revision, Some(2), "the engine compares the whole revision");
+fn a_single_word_of_the_revision_is_a_rule_of_the_declaration() {
+    let revision = |text: &str| format!("<Data>0001{text}000000</Data>");
+    let check = ("<Data>02000000</Data>", "<Data>0300</Data>");
+    let read = |word: &str| {
+        let lookup = revision(word);
+        let configuration = changed(&[("<Data>000108000000</Data>", lookup.as_str()), check]);
+        let coupler = configuration.declaration.subdevices[0].clone();
+        assert!(registers(&coupler).is_empty(), "the engine compares it");
+        (coupler.expected.revision, coupler.expected.revision_mask)
+    };
+    assert_eq!(read("0c"), (Some(0x0012_0003), 0xFFFF), "the upper word is the one of Info");
+    assert_eq!(read("0d"), (Some(0x0003_0000), 0xFFFF_0000));
+    let whole = changed(&[("<Data>000108000000</Data>", revision("0c").as_str())]);
+    let expected = whole.declaration.subdevices[0].expected;
+    assert_eq!((expected.revision, expected.revision_mask), (Some(2), u32::MAX));
     assert!(registers(&whole.declaration.subdevices[0]).is_empty());
+}
+
+// covers: ES-121, eni-image
+#[test]
+fn both_words_of_a_revision_are_the_whole_one_and_masked_words_are_sent() {
+    let lookup = "<Data>00010d000000</Data><Cnt>1</Cnt></InitCmd><InitCmd><Transition>IP</Transition>\
+                  <Comment>check high word</Comment><Cmd>1</Cmd><Adp>0</Adp><Ado>1288</Ado><Data>0000</Data>\
+                  <Cnt>1</Cnt><Validate><Data>0200</Data><Timeout>100</Timeout></Validate></InitCmd><InitCmd>\
+                  <Transition>IP</Transition><Comment>look up low word</Comment><Cmd>2</Cmd><Adp>0</Adp>\
+                  <Ado>1282</Ado><Data>00010c000000</Data>";
+    let read = |low: &str| {
+        let changes = [("<Data>000108000000</Data>", lookup), ("<Data>02000000</Data>", low)];
+        changed(&changes).declaration.subdevices[0].clone()
+    };
+    let coupler = read("<Data>0500</Data>");
+    assert_eq!((coupler.expected.revision, coupler.expected.revision_mask), (Some(0x0002_0005), u32::MAX));
+    assert!(registers(&coupler).is_empty());
+    let coupler = read("<Data>0500</Data><DataMask>0f00</DataMask>");
+    assert_eq!((coupler.expected.revision, coupler.expected.revision_mask), (Some(0x0002_0000), 0xFFFF_0000));
+    assert_eq!(registers(&coupler).len(), 2, "the address and the masked comparison");
+}
+
+// covers: 8.2, eni-image
+#[test]
+fn another_word_of_the_eeprom_is_compared_as_in_the_file() {
+    let lookup = ("<Data>000108000000</Data>", "<Data>000104000000</Data>");
+    for (check, bytes) in [("<Data>0000</Data>", vec![0, 0]), ("<Data>00</Data>", vec![0])] {
+        let configuration = changed(&[lookup, ("<Data>02000000</Data>", check)]);
+        let coupler = &configuration.declaration.subdevices[0];
+        assert_eq!((coupler.expected.revision, coupler.expected.revision_mask), (None, u32::MAX));
+        let commands = registers(coupler);
+        assert_eq!(commands.len(), 2, "the address, then the comparison");
+        assert_eq!(commands[0].1.address, RegisterAddress(0x0502));
+        assert_eq!(commands[0].1.access, RegisterAccess::Write(vec![0x00, 0x01, 0x04, 0, 0, 0]));
+        let limit = Duration::from_millis(100);
+        assert_eq!(commands[1].1.access, RegisterAccess::Check { data: bytes, mask: None, limit });
+    }
 }
 
 // covers: 3.11, eni-image

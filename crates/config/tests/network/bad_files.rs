@@ -181,3 +181,17 @@ fn deep_large_and_binary_files_are_refused_in_bounded_time() {
     let long = WHOLE.replacen("index = 0x1a01\n", &format!("index = 0x1a01\nentries = [{bits}]\n"), 1);
     assert!(refusal(long).contains("subdevice[1].sync_manager[1].pdo: expected at most 65535 bytes, got 95627"));
 }
+
+// covers: network-file
+#[test]
+fn two_subdevices_at_one_port_are_refused_unless_they_take_turns() {
+    let subdevice = |name: &str, more: &str| format!("[[subdevice]]\nname = \"{name}\"\n{more}\n");
+    let cable = "plugged_into = { subdevice = \"A\", port = 1 }\n";
+    let file = |more: &str| {
+        let parts = [subdevice("A", ""), subdevice("B", cable), subdevice("C", &format!("{cable}{more}"))];
+        format!("ringcat_network = 1\nname = \"m\"\n[[domain]]\nname = \"d\"\nperiod = \"1ms\"\n{}", parts.concat())
+    };
+    let error = refusal(file(""));
+    assert!(error.contains("subdevice[2].plugged_into: subdevice[1] is plugged into this port too"), "{error}");
+    NetworkFile::read("turns.toml", file("optional = true").as_bytes()).expect("one of them may be absent");
+}

@@ -63,6 +63,7 @@ mod mail_startup;
 mod mail_storm;
 mod mail_unrequested;
 mod mailbox_decoders;
+mod network_compare;
 mod network_files;
 mod observers;
 mod odd_sii;

@@ -1,0 +1,244 @@
+//! `compare` marks the differences that prevent OP: the same network is activated on the simulated bus, and whether it
+//! reaches OP judges the marks.
+
+use std::time::Duration;
+
+use ringcat::config::network::model::{CheckRevision, Entry, Required, SubDevice};
+use ringcat::config::{Difference, DifferenceKind, ExportOptions, FoundNetwork, Stated};
+use ringcat::eni::EniFile;
+use ringcat::network::{LoadedNetwork, NetworkFile, ScanOptions};
+use ringcat::simulated::SimulatedSegment;
+use ringcat::{Declaration, MainDevice, Options, Scan};
+
+use DifferenceKind::{Additional, Cable, Device, Identification, Mailbox, Missing, Order, Pdos, Revision, Serial};
+
+const LIMIT: Duration = Duration::from_secs(5);
+const PERIOD: Duration = Duration::from_millis(1);
+
+const OUTPUTS: usize = 1;
+const ANALOG: usize = 2;
+const DRIVE: usize = 3;
+/// The bus of the files: outputs without CoE, analogue inputs with fixed PDOs, a drive whose PDOs can be written.
+const BUS: [&str; 4] = ["coupler", "digital-output-8", "analog-input-4", "servo"];
+
+fn scanned(types: &[&str]) -> (MainDevice<SimulatedSegment>, Scan) {
+    let devices = types.iter().enumerate().map(|(at, kind)| {
+        let (kind, more) = kind.split_once(' ').unwrap_or((kind, ""));
+        format!("[[device]]\ntype = \"{kind}\"\nname = \"d{at}\"\n{}\n", more.replace(' ', "\n").replace('=', " = "))
+    });
+    let links = SimulatedSegment::from_toml(&devices.collect::<String>()).expect("the segment is valid");
+    let mut main_device = MainDevice::request(links, &Options::default());
+    let scan = main_device.scan().expect("the scan succeeds");
+    (main_device, scan)
+}
+
+/// The file of the bus, after a change.
+fn file_of(types: &[&str], change: impl FnOnce(&mut NetworkFile)) -> LoadedNetwork {
+    let (_, scan) = scanned(types);
+    let mut file = NetworkFile::from_scan(&scan.subdevices, &scan.topology, &ScanOptions::new("machine", PERIOD));
+    change(&mut file);
+    LoadedNetwork::new(file)
+}
+
+fn found(scan: &Scan) -> FoundNetwork<'_> {
+    FoundNetwork { subdevices: &scan.subdevices, topology: &scan.topology, firmware: &[] }
+}
+
+/// Whether the declared network reaches OP.
+fn reaches_op(main_device: MainDevice<SimulatedSegment>, declaration: Declaration) -> bool {
+    let Ok(mut application) = main_device.activate(declaration) else { return false };
+    application.wait_until_op(LIMIT).is_ok()
+}
+
+/// The differences of a network on a bus, judged by the bus.
+fn judged(network: &LoadedNetwork, types: &[&str]) -> Vec<Difference> {
+    let (main_device, scan) = scanned(types);
+    let differences = network.configuration.differences(found(&scan), &network.stated());
+    let is_prevented = differences.iter().any(|it| it.prevents_op);
+    assert_eq!(!is_prevented, reaches_op(main_device, network.declaration()), "{types:?}: {differences:#?}");
+    differences
+}
+
+fn kinds(differences: &[Difference]) -> Vec<(DifferenceKind, bool)> {
+    differences.iter().map(|it| (it.kind, it.prevents_op)).collect()
+}
+
+/// The same bus with a SubDevice inserted before this position.
+fn with<'a>(at: usize, kind: &'a str) -> Vec<&'a str> {
+    let mut types = BUS.to_vec();
+    types.insert(at, kind);
+    types
+}
+
+// covers: network-file
+#[test]
+fn an_additional_subdevice_prevents_op_where_it_moves_declared_positions() {
+    let network = file_of(&BUS, |_| ());
+    assert_eq!(kinds(&judged(&network, &BUS)), []);
+    let of_places = |differences: Vec<Difference>| -> Vec<(DifferenceKind, bool)> {
+        kinds(&differences).into_iter().filter(|(kind, _)| *kind != Cable).collect()
+    };
+    for (at, prevents) in [(0, true), (1, true), (3, true), (4, false)] {
+        assert_eq!(of_places(judged(&network, &with(at, "digital-input-8"))), [(Additional, prevents)], "{at}");
+    }
+    // One more of a row is the last one of it.
+    let row = ["coupler", "digital-output-8", "digital-output-8", "analog-input-4", "servo"];
+    assert_eq!(of_places(judged(&network, &row)), [(Additional, true)]);
+    let two = ["coupler", "digital-input-8", "digital-output-8", "analog-input-4", "servo", "digital-input-8"];
+    assert_eq!(of_places(judged(&network, &two)), [(Additional, true), (Additional, false)]);
+}
+
+// covers: network-file
+#[test]
+fn an_additional_subdevice_moves_no_declaration_by_alias() {
+    let types = ["coupler", "digital-output-8 alias=11", "servo alias=12"];
+    let by_alias = |file: &mut NetworkFile| {
+        for (subdevice, alias) in file.subdevice.iter_mut().skip(1).zip([11, 12]) {
+            (subdevice.position, subdevice.alias, subdevice.offset) = (None, Some(alias), Some(0));
+        }
+    };
+    let network = file_of(&types, by_alias);
+    let more = ["coupler", "digital-output-8 alias=11", "digital-input-8", "servo alias=12"];
+    assert_eq!(kinds(&judged(&network, &more))[0], (Additional, false));
+    let before = ["digital-input-8", "coupler", "digital-output-8 alias=11", "servo alias=12"];
+    assert_eq!(kinds(&judged(&network, &before))[0], (Additional, true), "the coupler is declared by position");
+}
+
+// covers: network-file
+#[test]
+fn a_missing_subdevice_prevents_op_unless_it_is_optional() {
+    let without: Vec<&str> = BUS.iter().copied().filter(|kind| *kind != "digital-output-8").collect();
+    assert_eq!(kinds(&judged(&file_of(&BUS, |_| ()), &without))[0], (Missing, true));
+    let optional = |file: &mut NetworkFile| file.subdevice[OUTPUTS].optional = true;
+    let network = file_of(&BUS, optional);
+    assert_eq!(kinds(&judged(&network, &without)), [(Missing, false)]);
+    let other = ["coupler", "digital-input-8", "analog-input-4", "servo"];
+    assert_eq!(kinds(&judged(&network, &other)), [(Device, false)], "another device in place of an optional one");
+    let all = file_of(&BUS, |file| {
+        optional(file);
+        file.required = Required::All;
+    });
+    assert_eq!(kinds(&judged(&all, &without)), [(Missing, true)]);
+}
+
+// covers: network-file
+#[test]
+fn swapped_subdevices_are_one_difference_that_names_both_places() {
+    let network = file_of(&BUS, |_| ());
+    let differences = judged(&network, &["coupler", "analog-input-4", "digital-output-8", "servo"]);
+    assert_eq!(kinds(&differences), [(Order, true)]);
+    let text = "\"digital-output-8\" is at position 2 instead of position 1, and \"analog-input-4\" at position 1 \
+                instead of position 2";
+    assert_eq!(differences[0].text, text);
+    let differences = judged(&network, &["coupler", "servo", "analog-input-4", "digital-output-8"]);
+    assert_eq!(kinds(&differences), [(Order, true)], "{differences:#?}");
+    let text = "\"digital-output-8\" is at position 3 instead of position 1, and \"servo\" at position 1 instead of \
+                position 3";
+    assert_eq!(differences[0].text, text);
+    let differences = judged(&network, &["coupler", "analog-input-4", "servo", "digital-output-8"]);
+    assert_eq!(kinds(&differences), [(Order, true)]);
+    assert_eq!(differences[0].text, "\"digital-output-8\" is at position 3, the file has it at position 1");
+    let optional = file_of(&BUS, |file| file.subdevice[OUTPUTS].optional = true);
+    assert_eq!(kinds(&judged(&optional, &["coupler", "analog-input-4", "servo", "digital-output-8"]))[0].1, false);
+}
+
+// covers: network-file
+#[test]
+fn another_identity_prevents_op_where_it_is_compared() {
+    let types = |serial: &str| ["coupler".to_owned(), format!("digital-output-8 serial={serial}"), "servo".to_owned()];
+    let (own, other) = (types("11"), types("12"));
+    let (own, other): (Vec<&str>, Vec<&str>) =
+        (own.iter().map(String::as_str).collect(), other.iter().map(String::as_str).collect());
+    let compared = |optional: bool| {
+        file_of(&own, |file| (file.subdevice[1].serial, file.subdevice[1].optional) = (Some(11), optional))
+    };
+    assert_eq!(kinds(&judged(&compared(false), &own)), []);
+    assert_eq!(kinds(&judged(&compared(false), &other)), [(Serial, true)]);
+    assert_eq!(kinds(&judged(&compared(true), &other)), [(Serial, false)]);
+    let revision = |check: CheckRevision| {
+        file_of(&own, |file| {
+            file.subdevice[1].revision = file.subdevice[1].revision.map(|revision| revision + 1);
+            file.subdevice[1].check_revision = check;
+        })
+    };
+    assert_eq!(kinds(&judged(&revision(CheckRevision::None), &own)), [(Revision, false)]);
+    assert_eq!(kinds(&judged(&revision(CheckRevision::LowEqual), &own)), [(Revision, true)]);
+    assert_eq!(kinds(&judged(&revision(CheckRevision::HighEqual), &own)), [(Revision, false)]);
+    let identified = file_of(&own, |file| file.subdevice[2].check_identification = Some(5));
+    assert_eq!(kinds(&judged(&identified, &own)), [(Identification, true)]);
+}
+
+/// A change of the entries of the first PDO of a SubDevice.
+fn entries(at: usize, change: fn(&mut Vec<Entry>)) -> LoadedNetwork {
+    file_of(&BUS, |file| change(pdo_entries(&mut file.subdevice[at])))
+}
+
+fn pdo_entries(subdevice: &mut SubDevice) -> &mut Vec<Entry> {
+    let with_pdos = subdevice.sync_manager.iter_mut().find(|it| !it.pdo.is_empty()).expect("process data");
+    with_pdos.pdo[0].entries.as_mut().expect("the scan has them")
+}
+
+// covers: network-file
+#[test]
+fn pdos_that_differ_prevent_op_where_they_cannot_be_written() {
+    let longer: fn(&mut Vec<Entry>) = |entries| entries[0].bits += 8;
+    assert_eq!(kinds(&judged(&entries(OUTPUTS, longer), &BUS)), [(Pdos, true)], "without CoE");
+    assert_eq!(kinds(&judged(&entries(ANALOG, longer), &BUS)), [(Pdos, true)], "the SII fixes them");
+    // The same length: the SubDevice takes the bits for what it has.
+    let other: fn(&mut Vec<Entry>) = |entries| entries[0].index += 1;
+    assert_eq!(kinds(&judged(&entries(OUTPUTS, other), &BUS)), [(Pdos, false)]);
+    assert_eq!(kinds(&judged(&entries(ANALOG, other), &BUS)), [(Pdos, false)]);
+    // The mapping is written.
+    let shorter: fn(&mut Vec<Entry>) = |entries| drop(entries.pop());
+    assert_eq!(kinds(&judged(&entries(DRIVE, shorter), &BUS)), [(Pdos, false)]);
+}
+
+// covers: network-file
+#[test]
+fn pdos_that_are_left_out_prevent_op_where_the_assignment_cannot_be_written() {
+    let types = ["coupler", "digital-output-16", "analog-input-4"];
+    let left = |at: usize, count: usize| {
+        file_of(&types, |file| {
+            let sync_manager = file.subdevice[at].sync_manager.iter_mut().rfind(|it| it.pdo.len() > 1);
+            sync_manager.expect("it has several PDOs").pdo.truncate(count);
+        })
+    };
+    let differences = judged(&left(1, 8), &types);
+    assert_eq!(kinds(&differences), [(Pdos, true)], "{differences:#?}");
+    assert!(differences[0].text.contains("SM 0: expected a length of 1, got 2"), "{}", differences[0].text);
+    assert_eq!(kinds(&judged(&left(2, 3), &types)), [], "it is written");
+}
+
+// covers: network-file
+#[test]
+fn cables_and_mailboxes_of_a_network_file_do_not_prevent_op() {
+    let mailbox = file_of(&BUS, |file| file.subdevice[DRIVE].mailbox.as_mut().expect("CoE").read.length += 2);
+    assert_eq!(kinds(&judged(&mailbox, &BUS)), [(Mailbox, false)]);
+    let cable = file_of(&BUS, |file| {
+        file.subdevice[ANALOG].plugged_into.as_mut().expect("a cable").port = 3;
+    });
+    assert_eq!(kinds(&judged(&cable, &BUS)), [(Cable, false)]);
+}
+
+/// An ENI has SyncManagers of its own, which are written.
+// covers: network-file, eni-run
+#[test]
+fn differences_from_an_eni_are_judged_by_the_bus_too() {
+    let changes: [(fn(&mut NetworkFile), &[(DifferenceKind, bool)]); 4] = [
+        (|_| (), &[]),
+        (|file| file.subdevice[DRIVE].mailbox.as_mut().expect("CoE").read.length -= 2, &[(Mailbox, true)]),
+        (|file| pdo_entries(&mut file.subdevice[OUTPUTS])[0].bits += 8, &[(Pdos, true)]),
+        (|file| drop(pdo_entries(&mut file.subdevice[DRIVE]).pop()), &[(Pdos, false)]),
+    ];
+    for (change, expected) in changes {
+        let file = file_of(&BUS, change).file;
+        let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        let eni = EniFile::from_bytes(export.text.as_bytes()).unwrap_or_else(|error| panic!("{error}"));
+        let (main_device, scan) = scanned(&BUS);
+        let stated: Vec<Stated> = eni.stated();
+        let differences = eni.configuration.differences(found(&scan), &stated);
+        assert_eq!(kinds(&differences), expected, "{differences:#?}");
+        let is_prevented = differences.iter().any(|it| it.prevents_op);
+        assert_eq!(!is_prevented, reaches_op(main_device, eni.declaration(false)), "{differences:#?}");
+    }
+}
