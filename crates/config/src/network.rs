@@ -19,10 +19,9 @@ mod unique;
 mod values;
 mod write;
 
-pub use error::NetworkError;
+pub use error::{MAX_NETWORK_BYTES, NetworkError};
 pub use from_esi::FromEsi;
 pub use from_scan::ScanOptions;
 pub use model::NetworkFile;
-pub use read::MAX_NETWORK_BYTES;
 pub use values::{Bytes, Mac, Shift, Time};
 pub use write::Digest;

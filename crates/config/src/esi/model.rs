@@ -6,6 +6,7 @@ mod dictionary;
 mod mailbox;
 mod names;
 mod pdo;
+mod reference;
 mod slots;
 
 pub use device::{
@@ -19,6 +20,7 @@ pub use dictionary::{
 pub use mailbox::{AoeSettings, CoeCommand, CoeSettings, EoeSettings, Mailbox, RawCommand, SoeCommand, Transition};
 pub use names::Names;
 pub use pdo::{Pdo, PdoEntry, SlotIndex};
+pub use reference::Reference;
 pub use slots::{AllowedModule, Module, ModuleClass, Slot, SlotDistances, SlotGroupData, Slots};
 
 use super::error::Notice;
@@ -70,15 +72,6 @@ pub struct Group {
     pub parent: Option<String>,
     /// Place in a list.
     pub sort_order: Option<i32>,
-}
-
-/// A reference to another file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Reference {
-    /// Line in the file.
-    pub line: u32,
-    /// The path as written.
-    pub path: String,
 }
 
 impl Esi {

@@ -33,10 +33,18 @@ pub(super) fn class(command: &EcatCommand) -> Class {
         0x0400 | 0x0410 | 0x0420 => Class::Handled,
         0x0500..=0x050F => Class::Handled,
         0x0600..=0x06FF | 0x0800..=0x087F => Class::Handled,
+        0x0980 if is_latch_only(&command.datagram.data) => Class::Raw,
         0x0900..=0x0937 | 0x0980..=0x09A7 => Class::Handled,
         0x09A8..=0x09A9 if zero => Class::Handled,
         _ => Class::Raw,
     }
+}
+
+/// Whether the word of 0x0980 assigns or activates units, but no SYNC signal (protocol ES-60).
+fn is_latch_only(data: &[u8]) -> bool {
+    /// SYNC0 and SYNC1 in the byte at 0x0981.
+    const SIGNALS: u8 = 0x06;
+    matches!(data, [low, high] if (*low, *high) != (0, 0) && high & SIGNALS == 0)
 }
 
 /// Whether it only writes.

@@ -2,7 +2,9 @@
 
 use std::fmt;
 
-use super::read::MAX_NETWORK_BYTES;
+/// Maximum number of bytes of a network file. A thousand SubDevices take less than 2 MB; one byte of text can take a
+/// hundred bytes of memory.
+pub const MAX_NETWORK_BYTES: usize = 8 << 20;
 
 /// An error in a network file.
 #[derive(Clone, Debug, PartialEq, Eq)]

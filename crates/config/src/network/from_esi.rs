@@ -303,8 +303,8 @@ fn clock(selection: &Selection<'_>, mode: &OpMode, cycle: Duration, into: &mut S
     Ok(())
 }
 
-/// What a network file does not hold of the settings of clocks (protocol ES-63, ES-63a). A device of which SYNC registers
-/// are not written gets no signals.
+/// What a network file does not hold of the settings of clocks (protocol ES-63). A device of which SYNC
+/// registers are not written gets no signals.
 fn clock_notices(device: &Device, mode: &OpMode, into: &mut SubDevice, from: &mut Notes) {
     let Some(clock) = &device.clock else { return };
     if clock.time_loop_only && into.sync.take().is_some() {
@@ -320,7 +320,7 @@ fn clock_notices(device: &Device, mode: &OpMode, into: &mut SubDevice, from: &mu
     if mode.shift_0_for_inputs && sync.sync0_shift.0 != 0 {
         let (mode, shift) = (mode.name.trim(), sync.sync0_shift.0);
         from.note(format!(
-            "operation mode \"{mode}\": the shift of SYNC0 of {shift} ns refers to inputs, it is counted from the begin of \
+            "operation mode \"{mode}\": the shift of SYNC0 of {shift} ns refers to inputs, it counts from the begin of \
              the cycle"
         ));
     }

@@ -6,12 +6,9 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::check::check;
-use super::error::{Fault, NetworkError, Step, path_text};
+use super::error::{Fault, MAX_NETWORK_BYTES, NetworkError, Step, path_text};
 use super::model::NetworkFile;
 
-/// Maximum number of bytes of a network file. A thousand SubDevices take less than 2 MB; one byte of text can take a
-/// hundred bytes of memory.
-pub const MAX_NETWORK_BYTES: usize = 8 << 20;
 /// Maximum bytes of a message of the TOML reader.
 const MAX_MESSAGE: usize = 600;
 

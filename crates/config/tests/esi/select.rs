@@ -77,7 +77,7 @@ fn without_choices_the_assignment_is_that_of_the_file() {
     assert_eq!(declared(&esi, DRIVE, &german).name, "AM01");
 }
 
-// covers: esi-declare, ES-63, ES-63a
+// covers: esi-declare, ES-63
 #[test]
 fn a_shift_adds_time_and_part_of_the_cycle_and_lost_settings_of_clocks_are_told() {
     let from = |text: &str| {

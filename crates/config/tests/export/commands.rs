@@ -33,6 +33,19 @@ fn contains(lines: &[Line], wanted: &[Line]) -> bool {
     lines.windows(wanted.len()).any(|window| window == wanted)
 }
 
+// covers: ES-60, eni-run
+#[test]
+fn latch_units_without_a_signal_are_activated_by_a_command_that_is_read_back() {
+    let latch = CELL.replace("{ address = 0x0200, data = \"04 00\",", "{ address = 0x0980, data = \"30 01\",");
+    assert_ne!(latch, CELL);
+    let network = network(&latch);
+    // The export is read back and compared.
+    let eni = model(&network.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}")).text);
+    let lines = eni.subdevices.iter().flat_map(|it| &it.init_commands);
+    let found = lines.filter(|it| it.datagram.data == [0x30, 0x01]).count();
+    assert_eq!(found, 1);
+}
+
 // covers: ES-117, ES-118, ES-120, eni-run
 #[test]
 fn each_state_change_is_requested_and_waited_for() {

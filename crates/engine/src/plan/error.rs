@@ -175,7 +175,7 @@ pub enum PlanProblem {
     NoProtocol(&'static str),
     /// A message without the header of its protocol, or an answer.
     Message,
-    /// A message of a start-up command that its mailbox cannot hold. It counts with the headers of mailbox and protocol.
+    /// A message of a start-up command that its mailbox cannot hold; the headers of mailbox and protocol count too.
     MailTooLong {
         /// Bytes of the message.
         bytes: usize,
@@ -302,9 +302,7 @@ impl fmt::Display for PlanProblem {
             }
             Self::NoCoe { .. } | Self::NoSoe { .. } | Self::NoEoe => self.fmt_protocol(f),
             Self::NoProtocol(_) | Self::Message | Self::NoMailInInit => self.fmt_protocol(f),
-            Self::MailTooLong { bytes, mailbox } => {
-                write!(f, "a start-up command has a message of {bytes} bytes, the mailbox has {mailbox}")
-            }
+            Self::MailTooLong { .. } => self.fmt_protocol(f),
             Self::DeclaredTwice { sync_manager } => write!(f, "SM {sync_manager} is declared twice"),
             Self::DeclaredMailboxes { out, inward } => {
                 write!(f, "expected a mailbox to the SubDevice and one from it, or none, got {out} and {inward}")
@@ -337,7 +335,7 @@ impl PlanProblem {
         Ok(())
     }
 
-    /// A start-up command needs a mailbox protocol that the SubDevice does not have.
+    /// A start-up command that the mailbox of the SubDevice does not take.
     fn fmt_protocol(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoCoe { index, sub_index } => {
@@ -348,6 +346,9 @@ impl PlanProblem {
             }
             Self::Message => {
                 f.write_str("a message of a start-up command has no header of its protocol, or is an answer")
+            }
+            Self::MailTooLong { bytes, mailbox } => {
+                write!(f, "a start-up command has a message of {bytes} bytes, the mailbox has {mailbox}")
             }
             Self::NoMailInInit => f.write_str("a mailbox command is declared from INIT to INIT: INIT has no mailbox"),
             Self::NoProtocol(protocol) => {

@@ -125,7 +125,8 @@ mod tests {
     fn described(own: u32, of_module: u32) -> Result<DeviceDescription, String> {
         let device = format!(
             "<Device Physics=\"YY\"><Type ProductCode=\"1\" RevisionNo=\"1\">A1</Type><Name>n</Name>{}<Slots>\
-             <Slot MaxInstances=\"1\" MinInstances=\"1\"><Name>s</Name><ModuleIdent>7</ModuleIdent></Slot></Slots></Device>",
+             <Slot MaxInstances=\"1\" MinInstances=\"1\"><Name>s</Name><ModuleIdent>7</ModuleIdent></Slot>\
+             </Slots></Device>",
             profile(0x2000, own)
         );
         let profile = profile(0x3000, of_module);
@@ -141,8 +142,8 @@ mod tests {
     // covers: esi-use, ES-72
     #[test]
     fn a_device_and_its_modules_have_room_for_values_together() {
-        let room = "too much for a device description: more than 16777216 bytes of values and names of the objects of a \
-                    device with its modules";
+        let room = "too much for a device description: more than 16777216 bytes of values and names of the objects \
+                    of a device with its modules";
         assert_eq!(described(120, 120).map(|it| it.objects.len()), Ok(240));
         assert_eq!(described(300, 0).map(|_| ()), Err(format!("acme.xml:257: device \"A1\": {room}")));
         assert_eq!(described(120, 200).map(|_| ()), Err(format!("acme.xml:258: device \"M1\": {room}")));

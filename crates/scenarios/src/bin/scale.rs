@@ -3,8 +3,8 @@
 //! Terminals as in [`scenarios::terminals`] form a closed ring on two links. With 1,000 of them and 1 us per hop the
 //! round trip exceeds a millisecond, so that cycles take 4 ms; with 0.3 us it does not. CPU is the CPU time of this
 //! process, engine and simulator together, while all are in OP, against that of a fixed work beside it, because other
-//! programs on the machine make both longer. Memory is the allocated memory since the segment was built: the MainDevice, and a few
-//! frames and queues of the simulator.
+//! programs on the machine make both longer. Memory is the allocated memory since the segment was built: the
+//! MainDevice, and a few frames and queues of the simulator.
 
 use std::process::ExitCode;
 use std::time::Duration;

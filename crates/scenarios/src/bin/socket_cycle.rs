@@ -67,8 +67,8 @@ const CPU_BARS: [(&str, f64, f64); 2] = [("block", 25.0, 8.0), ("hybrid", 35.0, 
 const CPU_RUNS: usize = 3;
 /// Maximum memory of the process itself with 50 servos: heap, stacks, receive rings. Measured are 1.43.
 const OWN_MEMORY_BAR_MB: f64 = 1.6;
-/// Maximum resident memory with 50 servos, and the goal. Measured are 5.41, of which 3.98 are pages of the program and of
-/// libraries; other kernels map up to 0.5 more of these around a fault (decision 0071).
+/// Maximum resident memory with 50 servos, and the goal. Measured are 5.41, of which 3.98 are pages of the program and
+/// of libraries; other kernels map up to 0.5 more of these around a fault (decision 0071).
 const MEMORY_BAR_MB: (f64, f64) = (6.25, 5.0);
 
 fn main() -> ExitCode {

@@ -5,10 +5,11 @@ use std::path::Path;
 
 use ringcat_wire::sii::SiiHeader;
 
+use super::SegmentError;
 use super::described::{DescribedDevice, Sources};
+use super::file::read_at_most;
 use super::format::{DeviceEntry, File, Place, duration, line};
 use super::services::services;
-use super::{SegmentError, read_at_most};
 use crate::catalogue;
 use crate::controller::Wander;
 use crate::description::{DcDescription, DeviceDescription, TransitionTimes};

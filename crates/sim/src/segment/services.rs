@@ -3,8 +3,8 @@
 use core::net::Ipv4Addr;
 use std::path::Path;
 
+use super::file::read_at_most;
 use super::format::{DeviceEntry, Place, duration};
-use super::read_at_most;
 use crate::description::{DeviceDescription, EoeDescription, EoeEnd, FoeDescription};
 
 /// Sizes of a mailbox: minimum for an SDO, maximum data of a datagram.

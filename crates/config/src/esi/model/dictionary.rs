@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::Reference;
 use super::names::Names;
 use super::pdo::SlotIndex;
+use super::reference::Reference;
 
 /// A profile of a device or module.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
