@@ -10,8 +10,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::{Args, Subcommand};
-use ringcat::config::esi::Choice;
 use ringcat::config::esi::index::{IndexedDevice, IndexedFile};
+use ringcat::config::esi::{Choice, choose};
 use ringcat::esi::EsiFolder;
 
 use crate::failure::Failure;
@@ -124,11 +124,25 @@ fn list(arguments: &ListArguments) -> Result<Report, Failure> {
     say!("{}, {read} read, {:.1} ms", counted(files, "file", "files"), took_us as f64 / 1e3);
     let words = counted(devices.len(), "device", "devices");
     let verdict = match devices.is_empty() {
-        true => Verdict::Failed("no description fits".to_owned()),
+        true => Verdict::Failed(format!("no description fits{}", nearest(&folder, arguments))),
         false => Verdict::Held(words),
     };
     let data = EsiList { devices, files, files_read: read, duplicates, refused, open_us: took_us };
     Ok(Report { verdict, data: Data::EsiList(data) })
+}
+
+/// The nearest description, where only newer ones of the variant are there (protocol ES-29).
+fn nearest(folder: &EsiFolder, arguments: &ListArguments) -> String {
+    let (Some(vendor), Some(product), Some(revision)) = (arguments.vendor, arguments.product, arguments.revision)
+    else {
+        return String::new();
+    };
+    let of_product = |it: &&IndexedDevice| (it.vendor_id, it.product_code) == (vendor, product);
+    let described = folder.index().devices().map(|(_, it)| it).filter(of_product).map(|it| it.revision);
+    match choose(described, revision, false) {
+        Choice::None(Some(nearest)) => format!("; that of revision {nearest:#010x} is newer: --newer takes it"),
+        _ => String::new(),
+    }
 }
 
 /// The devices of the command line: one for a revision, otherwise all that fit, by type.

@@ -22,6 +22,7 @@ use described::Sources;
 
 pub use described::{DescribedDevice, DescribedDevices, DescriptionFault, NoDescriptions};
 pub use error::SegmentError;
+use file::read_at_most;
 
 /// The segment file of the demonstration: a ring of couplers, terminals and a servo drive.
 pub const DEMO: &str = include_str!("../segments/demo.toml");

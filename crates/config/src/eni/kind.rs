@@ -51,7 +51,8 @@ impl FileKind {
     pub(super) fn of(root: Node<'_, '_>) -> Option<FileKind> {
         let name = root.tag_name().name();
         let is_cipher = |node: &Node<'_, '_>| matches!(node.tag_name().name(), "EncryptedData" | "CipherData");
-        if root.children().chain([root]).any(|node| is_cipher(&node)) {
+        // A part of a file may be encrypted, too.
+        if root.descendants().any(|node| is_cipher(&node)) {
             return Some(FileKind::Encrypted("XML encryption"));
         }
         // XML signatures: around the configuration, or in it (protocol ES-153).

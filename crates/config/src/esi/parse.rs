@@ -81,7 +81,10 @@ fn protection(name: &str) -> Option<&'static str> {
 fn root(root: Element<'_>) -> Result<Esi, EsiError> {
     let version = root.attribute("Version").map(str::to_owned);
     let names = std::iter::once(root.name()).chain(root.all().map(|child| child.name()));
-    if let Some(kind) = names.filter_map(protection).next() {
+    // A part of a file may be encrypted, too.
+    let is_cipher = |name: &str| name == "EncryptedData" || name == "CipherData";
+    let inside = root.names_below().find(|name| is_cipher(name));
+    if let Some(kind) = names.chain(inside).filter_map(protection).next() {
         return Err(root.error(EsiProblem::WrongFile { kind: kind.to_owned() }));
     }
     match root.name() {

@@ -34,8 +34,8 @@ impl NetworkFile {
             failed(Some(line), "expected UTF-8 text".to_owned())
         })?;
         let tree = DeTable::parse(text).map_err(|error| {
-            let line = error.span().map(|span| line_of(text, span.start));
-            failed(line, in_plain_words(error.message()))
+            let line = error.span().map_or_else(|| deepest_line(text), |span| line_of(text, span.start));
+            failed(Some(line), in_plain_words(error.message()))
         })?;
         let root = tree.get_ref();
         version(root).map_err(|fault| placed(name, text, root, &fault))?;
@@ -52,6 +52,27 @@ impl NetworkFile {
         check(&file).map_err(|fault| placed(name, text, root, &fault))?;
         Ok(file)
     }
+}
+
+/// The line with the most levels of tables and lists. The reader gives no place for levels beyond its limit.
+fn deepest_line(text: &str) -> usize {
+    let (mut open, mut deepest) = (0_usize, (0, 1));
+    for (number, line) in (1..).zip(text.lines()) {
+        let mut most = open;
+        for byte in line.bytes() {
+            match byte {
+                b'[' | b'{' => open += 1,
+                b']' | b'}' => open = open.saturating_sub(1),
+                _ => {}
+            }
+            most = most.max(open);
+        }
+        let levels = most + line.matches('.').count();
+        if levels > deepest.0 {
+            deepest = (levels, number);
+        }
+    }
+    deepest.1
 }
 
 /// The version comes first: a file of a later version may have any keys.

@@ -134,6 +134,7 @@ fn encrypted_and_signed_files_are_named() {
         ("<EncryptedData xmlns=\"http://www.w3.org/2001/04/xmlenc#\"/>", "an encrypted file"),
         ("<ds:Signature xmlns:ds=\"http://www.w3.org/2000/09/xmldsig#\"/>", "a signed file"),
         ("<EtherCATInfo><Signature/></EtherCATInfo>", "a signed file"),
+        ("<EtherCATInfo><Vendor><EncryptedData/></Vendor></EtherCATInfo>", "an encrypted file"),
     ] {
         let error = refusal(text);
         assert!(error.contains(kind), "{error}");

@@ -225,7 +225,9 @@ fn an_encrypted_file_is_refused_with_the_tool_that_writes_such_files() {
     let xml = br#"<?xml version="1.0"?>
         <EncryptedData xmlns="http://www.w3.org/2001/04/xmlenc#"><CipherData/></EncryptedData>"#;
     let salted = [&b"Salted__"[..], &random].concat();
+    let part = SMALL.replacen("<Slave>", "<Slave><EncryptedData><CipherData/></EncryptedData>", 1);
     for (bytes, what) in [
+        (part.as_bytes(), "XML encryption"),
         (&random[..], "random bytes"),
         (&salted[..], "encrypted with a password (OpenSSL)"),
         (&xml[..], "XML encryption"),

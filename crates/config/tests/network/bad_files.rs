@@ -20,6 +20,17 @@ fn changed(from: &str, to: &str) -> String {
     refusal(WHOLE.replacen(from, to, 1))
 }
 
+// covers: network-file
+#[test]
+fn levels_beyond_the_limit_are_refused_with_their_line() {
+    let head = "ringcat_network = 1\nname = \"m\"\n";
+    let (keys, lists) = (vec!["a"; 200].join("."), "[".repeat(200));
+    for text in [format!("{keys} = 1\n"), format!("[{keys}]\n"), format!("x = {lists}\n")] {
+        let error = refusal(format!("{head}{text}"));
+        assert!(error.starts_with("bad.toml:3: "), "{error}");
+    }
+}
+
 /// A text of the file, what takes its place, and a part of the error.
 const CHANGES: &[(&str, &str, &str)] = &[
     ("ringcat_network = 1", "ringcat_network = 2", "bad.toml:1: ringcat_network: expected version 1 of the format"),

@@ -64,7 +64,7 @@ fn kinds(differences: &[Difference]) -> Vec<(DifferenceKind, bool)> {
 }
 
 /// The same bus with a SubDevice inserted before this position.
-fn with<'a>(at: usize, kind: &'a str) -> Vec<&'a str> {
+fn with(at: usize, kind: &str) -> Vec<&str> {
     let mut types = BUS.to_vec();
     types.insert(at, kind);
     types
@@ -139,7 +139,7 @@ fn swapped_subdevices_are_one_difference_that_names_both_places() {
     assert_eq!(kinds(&differences), [(Order, true)]);
     assert_eq!(differences[0].text, "\"digital-output-8\" is at position 3, the file has it at position 1");
     let optional = file_of(&BUS, |file| file.subdevice[OUTPUTS].optional = true);
-    assert_eq!(kinds(&judged(&optional, &["coupler", "analog-input-4", "servo", "digital-output-8"]))[0].1, false);
+    assert!(!kinds(&judged(&optional, &["coupler", "analog-input-4", "servo", "digital-output-8"]))[0].1);
 }
 
 // covers: network-file
@@ -224,7 +224,8 @@ fn cables_and_mailboxes_of_a_network_file_do_not_prevent_op() {
 // covers: network-file, eni-run
 #[test]
 fn differences_from_an_eni_are_judged_by_the_bus_too() {
-    let changes: [(fn(&mut NetworkFile), &[(DifferenceKind, bool)]); 4] = [
+    type Change = fn(&mut NetworkFile);
+    let changes: [(Change, &[(DifferenceKind, bool)]); 4] = [
         (|_| (), &[]),
         (|file| file.subdevice[DRIVE].mailbox.as_mut().expect("CoE").read.length -= 2, &[(Mailbox, true)]),
         (|file| pdo_entries(&mut file.subdevice[OUTPUTS])[0].bits += 8, &[(Pdos, true)]),
