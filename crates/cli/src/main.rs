@@ -56,8 +56,8 @@ First steps:
   ringcat                              a demonstration on a simulated ring:
                                        no network, no permission
   ip link                              the network interfaces of this computer
-  ringcat doctor --main eth1           what on this computer would hurt, and
-                                       what mends it
+  ringcat doctor --main eth1           settings of this computer that disturb
+                                       a MainDevice, and what corrects them
   ringcat scan --main eth1             the SubDevices on the cable in eth1
   ringcat run --main eth1 --for 10s
                                        all SubDevices to OP, ten seconds of
@@ -124,7 +124,7 @@ enum Command {
     ///
     /// Which SubDevices answer on which interface, where the ring is broken, errors of each cable. It only reads.
     Ring(ring::RingArguments),
-    /// Shows what on this machine would hurt a MainDevice, and what mends it
+    /// Shows which settings of this machine disturb a MainDevice, and what corrects them
     ///
     /// Interfaces, kernel, processors, permissions, another MainDevice; how late a thread wakes up. It changes nothing.
     Doctor(doctor::DoctorArguments),

@@ -219,7 +219,7 @@ pub enum Query {
 }
 
 impl Query {
-    /// Longest time for the answer of what drives the master.
+    /// Longest time for the answer of the process that drives the master.
     pub fn limit(&self) -> Duration {
         match self {
             Query::Tool(ask) if ask.is_long() => LONG,

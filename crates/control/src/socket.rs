@@ -3,7 +3,7 @@
 //! A daemon of root listens at [`DEFAULT_SOCKET`]. One of another user listens in a directory that only this user can
 //! write: the one for its running programs (`XDG_RUNTIME_DIR`, or `/run/user/UID`), or `/tmp/ringcat-UID` where there
 //! is none. Clients look at the places of their own user first, then at that of root. A directory of another user, or
-//! one that others can write, is none: a stranger could listen there.
+//! one that others can write, is not used: another user could listen there.
 
 use std::ffi::OsString;
 use std::fs::DirBuilder;

@@ -35,7 +35,7 @@ pub enum ToolQuery {
         /// Position of the first.
         from: u16,
     },
-    /// What is known of a SubDevice from its SII, its controller and its dictionary. Costs no frame.
+    /// What is known of a SubDevice from its SII, its controller and its dictionary. Needs no frame.
     Description {
         /// Its position.
         position: u16,

@@ -1,8 +1,8 @@
-//! Text behind text.
+//! Appends formatted text to a string.
 
 use std::fmt::{Arguments, Write};
 
-/// `append!(text, "{a} {b}")`: writes behind a string, without a string in between.
+/// `append!(text, "{a} {b}")`: appends to a string, without a temporary string.
 macro_rules! append {
     ($text:expr, $($format:tt)*) => {
         $crate::append::formatted(&mut $text, format_args!($($format)*))
@@ -14,6 +14,6 @@ pub(crate) use append;
 /// See [`append!`]: one function, because each place that makes a string has to free it too.
 #[inline(never)]
 pub fn formatted(text: &mut String, format: Arguments<'_>) {
-    // A string takes everything.
+    // Writing to a string cannot fail.
     let _ = text.write_fmt(format);
 }

@@ -38,7 +38,7 @@ pub fn bash() -> String {
     let mut cases = String::new();
     for command in ALL {
         let literals: String = literals(command).map(|word| format!("{word} ")).collect();
-        // A string takes everything; so below.
+        // Writing to a string cannot fail, here and below.
         let _ = writeln!(cases, "    {}) words=\"{literals}{}\" ;;", command.name, words(&all_options(command)));
     }
     format!(

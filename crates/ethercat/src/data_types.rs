@@ -88,7 +88,7 @@ pub const ALL: [DataType; 27] = [
 /// The type with a name.
 ///
 /// # Errors
-/// There is none.
+/// No type has this name.
 pub fn named(name: &str) -> Result<DataType, Failure> {
     let found = ALL.into_iter().find(|data_type| data_type.name == name);
     found.ok_or_else(|| Failure::usage(format!("Invalid data type '{name}'!")))
@@ -169,7 +169,7 @@ impl DataType {
     /// The bytes of a value that a user writes.
     ///
     /// # Errors
-    /// It is none of the type, or out of its range.
+    /// It is no value of the type, or out of its range.
     pub fn read(self, text: &str) -> Result<Vec<u8>, Failure> {
         let value = self.encode(text);
         value.ok_or_else(|| Failure::usage(format!("Invalid value argument '{text}' for type '{}'!", self.name)))

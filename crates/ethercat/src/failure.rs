@@ -76,7 +76,7 @@ impl Failure {
     }
 }
 
-/// The daemon answers something else; one of this version does not.
+/// The daemon gives an answer of another kind; a daemon of this version does not.
 pub fn unexpected() -> Failure {
     Failure::failed("The daemon has answered another question.")
 }

@@ -34,7 +34,7 @@ pub fn usage() -> String {
     let mut text = "Usage: ethercat <COMMAND> [OPTIONS] [ARGUMENTS]\n\nCommands (can be abbreviated):\n".to_owned();
     let width = ALL.iter().map(|command| command.name.len()).max().unwrap_or(0);
     for command in ALL {
-        // A string takes everything.
+        // Writing to a string cannot fail.
         let _ = writeln!(text, "  {:width$}  {}", command.name, command.summary);
     }
     text += "\nOptions of all commands:\n";
@@ -49,7 +49,7 @@ pub fn usage() -> String {
 pub fn of(command: &Command) -> String {
     let mut text = String::new();
     for form in command.forms {
-        // A string takes everything.
+        // Writing to a string cannot fail.
         let _ = writeln!(text, "ethercat {} [OPTIONS]{}{form}", command.name, if form.is_empty() { "" } else { " " });
     }
     let _ = write!(text, "\n{}\n", command.summary);

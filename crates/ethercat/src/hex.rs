@@ -27,7 +27,7 @@ pub fn lines(indent: &str, bytes: &[u8]) -> String {
     let mut text = String::new();
     for line in bytes.chunks(16) {
         text.push_str(indent);
-        // A string takes everything.
+        // Writing to a string cannot fail.
         line.iter().for_each(|byte| _ = write!(text, "{byte:02x} "));
         text.push('\n');
     }

@@ -2,7 +2,7 @@
 //! them. It asks the daemon `ringcatd`, and through it the application that drives a segment.
 //!
 //! * [`arguments`]: options and words of the command line; [`numbers`]: numbers and lists of them;
-//! * [`shape`]: what a command is; [`commands`]: all of them, found by abbreviations; [`help`]: how they are used;
+//! * [`shape`]: the description of a command; [`commands`]: all commands, also by abbreviation; [`help`]: their use;
 //! * [`completion`], [`manual`]: scripts for shells and manual pages, from [`options_help`] and the same help;
 //! * [`standalone`]: a bus without a daemon, for one command;
 //! * [`session`]: the daemon and its masters; [`selection`]: SubDevices by alias and position;

@@ -30,7 +30,7 @@ fn options(title: &str, options: &[OptionHelp]) -> String {
     for OptionHelp { name, letter, value, text: about } in options {
         let value = if value.is_empty() { String::new() } else { format!(" \\fI{}\\fR", roff(value)) };
         let letter = if letter.is_empty() { String::new() } else { format!("\\fB\\-{letter}\\fR, ") };
-        // A string takes everything; so below.
+        // Writing to a string cannot fail, here and below.
         let _ = write!(text, ".TP\n{letter}\\fB\\-\\-{}\\fR{value}\n{}\n", roff(name), roff(about));
     }
     text

@@ -22,7 +22,7 @@ fn parse_u64(text: &str) -> Option<u64> {
         None if text.len() > 1 && text.starts_with('0') => (&text[1..], 8),
         None => (text, 10),
     };
-    // A sign in between is none.
+    // A sign behind the prefix is no digit.
     let is_number = digits.chars().all(|digit| digit.is_digit(radix)) && !digits.is_empty();
     if is_number { u64::from_str_radix(digits, radix).ok() } else { None }
 }

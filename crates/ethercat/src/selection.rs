@@ -61,7 +61,7 @@ pub fn state(status: u16) -> String {
     format!("{name}{error}")
 }
 
-/// With the aliases from which they are counted.
+/// SubDevices with the aliases from which they are counted.
 pub fn counted(lines: Vec<SubDeviceLine>) -> Vec<Slave> {
     let (mut alias, mut relative) = (0, 0);
     let count = |line: SubDeviceLine| {

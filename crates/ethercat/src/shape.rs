@@ -1,4 +1,4 @@
-//! What a command is.
+//! The description of a command: name, help, options, and the function that runs it.
 
 use crate::failure::Failure;
 use crate::session::Session;

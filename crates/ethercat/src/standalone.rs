@@ -26,7 +26,7 @@ const PROGRAM: &str = "ringcatd";
 const START: Duration = Duration::from_secs(20);
 /// SubDevices whose states do not change for this time stay as they are.
 const STILL: Duration = Duration::from_millis(500);
-/// Interval of looks.
+/// Interval of checks.
 const LOOK: Duration = Duration::from_millis(2);
 /// An interface that was just switched on has a link, and a segment with a link was scanned, within this time.
 const LINK: Duration = Duration::from_secs(3);

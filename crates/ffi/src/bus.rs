@@ -23,7 +23,7 @@ use crate::responder::{DaemonResponder, Responder, code_of};
 const READY_LIMIT: Duration = Duration::from_secs(20);
 /// A request waits so long for the first SubDevice to answer.
 const SILENCE: Duration = Duration::from_millis(300);
-/// Interval of looks at the progress.
+/// Interval of checks at the progress.
 const PAUSE: Duration = Duration::from_micros(500);
 /// A request waits so long while the master passes from one process to another.
 const CHANGE: Duration = Duration::from_secs(5);
@@ -235,8 +235,8 @@ impl Bus {
     }
 
     /// Waits until the scan has ended and the PDOs of the dictionaries are known. SubDevices that are not in PREOP yet
-    /// are on their way; what needs their mailboxes waits for that, and an activation leads them on from where they
-    /// are.
+    /// are on their way; what needs their mailboxes waits for that, and an activation continues from their present
+    /// states.
     pub fn wait_until_scanned(&self) {
         let begin = Instant::now();
         loop {

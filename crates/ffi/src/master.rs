@@ -220,7 +220,7 @@ impl Master {
         self.change(|draft| {
             let found = draft.found();
             let loaded = draft.load(file);
-            // A part of a network is none.
+            // A network is declared as a whole or not at all.
             if loaded.is_err_and(|code| code != Code::BUSY) {
                 *draft = Draft::default();
                 draft.set_found(found);

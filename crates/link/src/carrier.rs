@@ -123,12 +123,12 @@ struct Watched {
     carrier: Carrier,
     /// It has this address, and no name yet.
     address: Option<[u8; 6]>,
-    /// Looks until its name is searched for again.
+    /// Checks until its name is searched for again.
     pause: u32,
 }
 
 impl Watched {
-    /// Looks between searches for a name, which take longer than those at a carrier.
+    /// Checks between searches for a name, which take longer than the check of a carrier.
     const PAUSE: u32 = 100;
 
     fn new(socket: &OwnedFd, name: &str) -> Watched {

@@ -315,7 +315,7 @@ impl Switch {
             let now = found.iter().find(|it| it.is_at_place_of(&end.subdevice));
             end.subdevice = *now.unwrap_or(&end.subdevice);
             if now.is_none() {
-                // One that outlasts its place here leads nowhere meanwhile.
+                // Nothing moves the frames of one that outlasts this MainDevice.
                 end.interface.set_carrier(false);
             }
             !removed && now.is_some()

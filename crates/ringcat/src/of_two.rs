@@ -15,7 +15,7 @@ use crate::standby::{ForwardingCounters, MAX_AGE, Reads, StoreAndForward};
 
 /// Frames that are older than this number of cycles are not forwarded: the ACTIVE has given them up.
 const MAX_AGE_CYCLES: u32 = 2;
-/// But those of this age are, however short the cycle: threads are late now and then.
+/// Frames up to this age are forwarded however short the cycle is: threads are late now and then.
 const LEAST_AGE: Duration = Duration::from_millis(1);
 
 /// A MainDevice of two, or one that is alone.

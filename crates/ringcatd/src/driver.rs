@@ -46,15 +46,15 @@ impl Current {
         self.driver.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Another one drives it from now on. What did before.
+    /// Another process drives it from now on. Returns what drove it before.
     pub fn set(&self, driver: Driver) -> Driver {
         let before = std::mem::replace(&mut *self.lock(), driver);
         self.changed.notify_all();
         before
     }
 
-    /// Takes over what the daemon drives. While the master is on its way to the daemon, and while the
-    /// daemon has not seen yet that the process of the owner has ended, that is waited for, up to a limit.
+    /// Takes over what the daemon drives. Waits, up to a limit, while the master passes to the daemon, and while the
+    /// daemon has not seen yet that the process of the owner has ended.
     ///
     /// # Errors
     /// Another process drives it, or nothing does.

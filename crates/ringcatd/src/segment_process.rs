@@ -22,7 +22,7 @@ use ringcat_link::signals::unblock;
 
 /// The option of the daemon's program that makes it the process of a segment.
 pub const OPTION: &str = "--simulate";
-/// Interval of looks for new pipes.
+/// Interval of checks for new pipes.
 const LOOK: Duration = Duration::from_millis(1);
 /// The process says within this time what its segment is.
 const START: Duration = Duration::from_secs(20);

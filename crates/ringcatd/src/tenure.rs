@@ -17,7 +17,7 @@ use crate::master::{End, Master};
 use crate::owner::OwnerLink;
 use crate::process_state::{ProcessFile, ProcessState};
 
-/// Interval of looks at the process of an owner.
+/// Interval of checks at the process of an owner.
 const LOOK: Duration = Duration::from_millis(2);
 /// Between the end of a connection and that of its process, both by the kernel.
 const EXIT: Duration = Duration::from_millis(10);

@@ -177,7 +177,7 @@ impl Interfaces {
     }
 
     /// The first interface that is free is chosen once, and stays until it is left: after an application that has it
-    /// the daemon leads its SubDevices to their safe state in any case.
+    /// the daemon brings its SubDevices to their safe state in any case.
     fn settled(&mut self, device: Device) -> Result<Device, String> {
         if device != Device::First {
             return Ok(device);
@@ -224,7 +224,7 @@ impl Drop for Wires {
 mod tests {
     use super::*;
 
-    /// An application may get the interface between the look and the decision: it stays chosen then.
+    /// An application may get the interface between the check and the decision: it stays chosen then.
     // covers: daemon
     #[test]
     fn an_interface_stays_chosen_until_it_is_left_whatever_hinders_it() {

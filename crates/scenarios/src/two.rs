@@ -2,8 +2,8 @@
 //! other through the network, without links and threads.
 //!
 //! Each [`Controller`] runs as an application would: cycles on its own clock as ACTIVE, in step with the frames that it
-//! forwards as INACTIVE. [`Two`] gives them the time, and checks what the SubDevices notice: which leave OP, and
-//! whether an output goes back to an older value.
+//! forwards as INACTIVE. [`Two`] gives them the time, and checks the effects on the SubDevices: which of them leave OP,
+//! and whether an output goes back to an older value.
 
 mod controller;
 

@@ -61,7 +61,7 @@ pub struct Finding {
     pub interface: Option<String>,
     pub what: String,
     pub why: &'static str,
-    /// Commands that mend it, and steps that are no command, one per line.
+    /// Commands that correct it, and steps that are no command, one per line.
     pub mend: Vec<String>,
 }
 
@@ -76,7 +76,7 @@ impl Topic {
         self.find(Level::Minor, what, mend)
     }
 
-    /// It harms.
+    /// It disturbs the segment.
     pub fn bad(self, what: impl Display, mend: &[&str]) -> Finding {
         self.find(Level::Bad, what, mend)
     }
@@ -130,7 +130,7 @@ impl Finding {
         self.interface.iter().map(String::as_str).chain([self.id]).collect::<Vec<_>>().join(" ")
     }
 
-    /// Its lines: what, why where it is not good, and what mends it.
+    /// Its lines: what, why where it is not good, and what corrects it.
     fn lines(&self) -> Vec<String> {
         let mut lines = wrapped(self.level.name(), &format!("{}: {}", self.subject(), self.what));
         if self.level != Level::Good {

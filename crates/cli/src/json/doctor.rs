@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::values::Times;
 
-/// What on this machine would hurt a MainDevice.
+/// Settings of this machine that disturb a MainDevice.
 #[derive(Clone, Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Doctor {

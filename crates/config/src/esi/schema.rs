@@ -1,5 +1,5 @@
 //! The elements and attributes of all editions of the schema (protocol ES-09), as far as the reader uses them or leaves
-//! them out on purpose. What is not in them is a notice, so that a misspelt or a new element does not go unseen.
+//! them out on purpose. What is not in them is a notice, so that a misspelt or a new element is not overlooked.
 //!
 //! Input: the root of a file. Output: notices.
 

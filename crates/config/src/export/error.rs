@@ -45,7 +45,7 @@ impl fmt::Display for ExportError {
 
 impl std::error::Error for ExportError {}
 
-/// A setting that the file does not hold. The network of the file comes to OP without it.
+/// A setting that the file does not hold. The network of the file reaches OP without it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct LeftOut {

@@ -1,8 +1,8 @@
 //! Logical addresses of the process data: FMMUs, and the cyclic commands.
 //!
-//! The logical address of a byte of process data is its place in the image plus the begin of a window, one window for
-//! the outputs and one for the inputs of each task, and one for what is in LRW commands. So the offset of a command in
-//! the image is its logical address without the begin of the window.
+//! The logical address of a byte of process data is its place in the image plus the beginning of a window, one window
+//! for the outputs and one for the inputs of each task, and one for what is in LRW commands. So the offset of a command
+//! in the image is its logical address minus the beginning of the window.
 
 mod cyclic;
 

@@ -1,4 +1,4 @@
-//! Settings that an ENI has no place for and without which the network comes to OP all the same.
+//! Settings that an ENI has no place for and without which the network reaches OP nevertheless.
 
 use std::time::Duration;
 

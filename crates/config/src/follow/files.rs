@@ -62,7 +62,7 @@ fn action(request: &[u8], behind: &[&[u8]]) -> Result<StartupAction, String> {
 }
 
 fn text(name: &[u8]) -> Result<&str, String> {
-    // Some tools write the end of a string of C.
+    // Some tools write the terminating zero of a C string.
     let name = name.strip_suffix(&[0]).unwrap_or(name);
     let name = core::str::from_utf8(name).ok().filter(|name| !name.is_empty() && !name.contains('\0'));
     name.ok_or_else(|| "the name of the file is no text: not sent".to_owned())

@@ -1,4 +1,4 @@
-//! What a small description can bring in: files that it refers to, and values of objects.
+//! What a small description can lead to: files that it refers to, and values of objects.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;

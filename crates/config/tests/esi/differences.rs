@@ -1,4 +1,4 @@
-//! What a SubDevice of the bus and its description say differently.
+//! Differences between a SubDevice on the bus and its description.
 
 use std::time::Duration;
 

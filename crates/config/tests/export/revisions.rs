@@ -1,4 +1,5 @@
-//! The rules for revisions (protocol ES-121): what the commands of a written file compare, and what is told instead.
+//! The rules for revisions (protocol ES-121): what the commands of a written file compare, and what is reported
+//! instead.
 
 use ringcat_config::eni::{SubDevice, Target};
 use ringcat_config::network::model::CheckRevision;

@@ -1,4 +1,4 @@
-//! What answers to the tool tell of a master, its SubDevices and an application.
+//! What answers to the tool contain about a master, its SubDevices and an application.
 
 use std::net::Ipv4Addr;
 

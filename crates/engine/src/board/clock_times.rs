@@ -115,7 +115,8 @@ impl TimeWords {
         }
     }
 
-    /// The offsets of all clocks are being written: their system time goes back to so many nanoseconds since the begin.
+    /// The offsets of all clocks are being written: their system time goes back to so many nanoseconds since the
+    /// beginning.
     pub fn post_slid(&self, slid: u64) {
         self.slid.store(slid, Ordering::Release);
     }

@@ -27,7 +27,7 @@ use crate::link::Link;
 use crate::ring::{Sequence, foreign_frame, is_forwarded};
 use crate::time::Instant;
 
-/// A cycle that is this much older than the newest one is none of the same count: the ACTIVE has begun anew.
+/// A cycle whose number is this much lower than the newest one belongs to another count: the ACTIVE has begun anew.
 const ANEW: i32 = -16;
 
 /// The last cycle of which everything has arrived.

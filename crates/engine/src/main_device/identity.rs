@@ -95,7 +95,7 @@ fn clocks(declaration: &Declaration) -> u32 {
 fn domains(domains: &[DomainConfig]) -> u32 {
     let mut digest = Digest::default();
     for domain in domains {
-        // Memory of the application is its own matter.
+        // Where the memory of a domain comes from may differ.
         let DomainConfig { period, under_way, sends_again, members, registered, memory: _ } = domain;
         digest.write_u16(0xD0);
         digest.field(1, period, &Duration::ZERO);

@@ -75,7 +75,7 @@ impl Damper {
         self.is_unsteady && !was
     }
 
-    /// When it no longer changes too often, if it does not change again; `None` if it does not.
+    /// When it no longer changes too often, if it does not change again; `None` if it does not change too often now.
     pub(crate) fn steady_at(&self, now: Instant) -> Option<Instant> {
         self.changed_at.filter(|_| self.is_unsteady(now)).map(|at| at + STEADY)
     }

@@ -55,7 +55,7 @@ pub enum DeclarationFinding {
         /// Its identity.
         identity: Identity,
     },
-    /// A declaration has no SubDevice, and does without.
+    /// A declaration has no SubDevice, and none is necessary.
     Absent {
         /// The declaration.
         subdevice: SubDeviceId,

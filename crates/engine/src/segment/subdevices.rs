@@ -39,7 +39,7 @@ impl SubDevices {
         SubDevices::new(Vec::new(), found.subdevices.iter().map(undeclared))
     }
 
-    /// The list at the begin of a stage: all have their station addresses since this version, and the attempts to
+    /// The list at the beginning of a stage: all have their station addresses since this version, and the attempts to
     /// configure members count from this number on.
     pub(super) fn begun(mut self, version: u32, attempt: u32) -> SubDevices {
         self.all.iter_mut().for_each(|it| it.key.since = version);

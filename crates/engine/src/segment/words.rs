@@ -30,7 +30,7 @@ use self::round::SinceRound;
 pub(super) struct Reader {
     /// The words before.
     pub before: SinceBefore,
-    /// The words at the begin of the last round of reads.
+    /// The words at the beginning of the last round of reads.
     pub round: SinceRound,
     /// The ring as it was processed last.
     pub ring: SinceReport,

@@ -1,4 +1,4 @@
-//! The common state with one way to it, which knows when the state may have changed.
+//! The common state behind one access, which notes when the state may have changed.
 //!
 //! An application with one thread asks in each pass of its waits whether the acyclic half has work. The answer changes
 //! only with the state, which changes only through [`SharedCell::borrow_mut`], and with words that others post.

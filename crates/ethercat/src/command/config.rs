@@ -78,7 +78,7 @@ pub(super) fn declared(session: &mut Session<'_>, master: u32) -> Result<Vec<Dec
     }
 }
 
-/// Position and AL state of the SubDevice that is the declared one; empty without.
+/// Position and AL state of the SubDevice that is the declared one; empty where there is none.
 fn attached(line: &DeclaredLine, slaves: &[Slave]) -> Option<(u16, String)> {
     let position = line.found?;
     let slave = slaves.iter().find(|slave| slave.line.position == position);

@@ -64,7 +64,7 @@ fn sync_manager(own: &DeclaredSyncManager) -> String {
     };
     let mut text = format!("SM{}, Dir: {direction}, Watchdog: {watchdog}\n", own.index);
     for pdo in &own.pdos {
-        // A string takes everything.
+        // Writing to a string cannot fail.
         let _ = writeln!(text, "  PDO 0x{:04x}", pdo.index);
         for entry in &pdo.entries {
             let (index, sub_index) = (entry.index, entry.sub_index);

@@ -64,7 +64,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     }
 }
 
-/// What reads the output.
+/// Whether the output still has a reader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Reader {
     Reads,

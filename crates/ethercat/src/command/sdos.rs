@@ -101,7 +101,7 @@ fn print_json(session: &mut Session<'_>, master: u32, position: u16) -> Result<(
     json::print(session, &Sdos::new(master, position, &all, has_entries))
 }
 
-/// A name of a dictionary, which holds what the SubDevice sends: one line, and nothing that a terminal obeys.
+/// A name of a dictionary, which holds what the SubDevice sends: one line without control characters.
 fn printable(name: &str) -> String {
     name.chars().map(|it| if it.is_control() { ' ' } else { it }).collect()
 }

@@ -24,7 +24,7 @@ pub struct Config<'a> {
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Declared<'a> {
-    /// Alias; 0: the position counts from the begin of the bus
+    /// Alias; 0: the position counts from the beginning of the bus
     pub alias: u16,
     /// Position, or position behind the alias
     pub position: u16,

@@ -44,7 +44,7 @@ pub struct Domain<'a> {
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Area<'a> {
-    /// Alias of the declared SubDevice; 0: its position counts from the begin of the bus
+    /// Alias of the declared SubDevice; 0: its position counts from the beginning of the bus
     pub alias: u16,
     /// Its position, or its position behind the alias
     pub position: u16,

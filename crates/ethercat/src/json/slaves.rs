@@ -25,7 +25,8 @@ pub struct SubDevice<'a> {
     pub position: u16,
     /// Station alias of the SubDevice; 0: none
     pub alias: u16,
-    /// The last alias at or before it, from which `relative_position` counts; 0: it counts from the begin of the bus
+    /// The last alias at or before it, from which `relative_position` counts; 0: it counts from the beginning of the
+    /// bus
     pub last_alias: u16,
     /// Position behind the SubDevice with the last alias
     pub relative_position: u16,

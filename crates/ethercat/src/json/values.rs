@@ -17,7 +17,7 @@ pub enum Link {
 }
 
 impl Link {
-    /// One of both.
+    /// The redundant link, or the main link.
     pub fn of(is_redundant: bool) -> Link {
         if is_redundant { Link::Redundant } else { Link::Main }
     }
@@ -35,7 +35,7 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// One of both.
+    /// The direction of outputs, or of inputs.
     pub fn of(is_output: bool) -> Direction {
         if is_output { Direction::Outputs } else { Direction::Inputs }
     }

@@ -70,7 +70,7 @@ impl Writer {
         for it in text.chars() {
             match it {
                 '"' | '\\' => self.text.extend(['\\', it]),
-                // A string takes everything.
+                // Writing to a string cannot fail.
                 '\0'..'\x20' | '\x7F' => _ = write!(self.text, "\\u{:04x}", it as u32),
                 it => self.text.push(it),
             }

@@ -231,7 +231,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// What has come since then.
+    /// The counts since then.
     pub fn since(&self, before: &Counts) -> Counts {
         Counts {
             cycles: self.cycles - before.cycles,

@@ -71,7 +71,7 @@ const IDLE: &[Case] = &[
     Case("xml_p1", &["xml", "-p1"], Nothing),
 ];
 
-/// Cases with an application, and with what the standard ring has not.
+/// Cases with an application, and with what the standard ring does not have.
 const OPERATION: &[Case] = &[
     Case("config", &["config"], Nothing),
     Case("config_v", &["config", "-v"], Nothing),
@@ -91,7 +91,7 @@ fn expected(place: &Path, name: &str) -> Done {
     let read = |suffix: &str| fs::read(place.join(format!("{name}.{suffix}"))).unwrap_or_default();
     let bytes = read("out");
     let errors = String::from_utf8_lossy(&read("err")).into_owned();
-    // The original ran beside a stand-in that reported what it was asked.
+    // The original ran with a substitute for its kernel module, which reported each request.
     let err = errors.lines().filter(|line| !line.starts_with("[shim]")).map(|line| format!("{line}\n")).collect();
     let code = String::from_utf8_lossy(&read("rc")).trim().parse().ok();
     Done { out: String::from_utf8_lossy(&bytes).into_owned(), bytes, err, code }

@@ -33,7 +33,7 @@ fn bash_offers_commands_and_their_options() {
     assert!(ALL.iter().all(|command| all.iter().any(|word| word == command.name)), "{all:?}");
 }
 
-/// Whether a program takes a file without a word; true where it is not there.
+/// Whether a program accepts a file without a message; true where the program is not installed.
 fn takes(program: &str, options: &[&str], file: &std::path::Path) -> bool {
     let output = Command::new(program).args(options).arg(file).stdin(Stdio::null()).output();
     let Ok(output) = output else {

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use crate::library::{interrupted_after, program, root, workshop};
 
-/// Interval of looks for the end of a program while its lines are read.
+/// Interval of checks for the end of a program while its lines are read.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Cycles of 1 ms of the program.

@@ -1,4 +1,4 @@
-//! The commands of the README, as they are typed, by a user without a right.
+//! The commands of the README, as they are typed, by a user without privileges.
 //!
 //! What is built and installed there is what the tests have: `cargo` and `crates/ffi/install` are scripts that put it
 //! into place.
@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use crate::library::{copy_program, installed, root};
 
-/// A user without a right.
+/// A user without privileges.
 const USER: &str = "65534";
 /// The heading above the commands.
 const HEADING: &str = "## A daemon that owns the bus, and programs for `ecrt.h`";

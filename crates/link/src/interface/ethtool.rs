@@ -135,7 +135,7 @@ fn driver(words: &[u32; ETHTOOL_WORDS]) -> Driver {
     Driver { name: text(0), bus: Some(text(3)).filter(|bus| bus != "N/A").unwrap_or_default() }
 }
 
-/// `ethtool_cmd`: the speed is in two halves, 12 and 28 bytes from its begin.
+/// `ethtool_cmd`: the speed is in two halves, 12 and 28 bytes from its beginning.
 fn link(words: &[u32; ETHTOOL_WORDS]) -> Link {
     let byte = |at: usize| words[at / 4].to_ne_bytes()[at % 4];
     let half = |at: usize| u32::from(u16::from_ne_bytes([byte(at), byte(at + 1)]));

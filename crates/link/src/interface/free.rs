@@ -1,7 +1,7 @@
-//! Whether EtherCAT may take an interface that is not named: what hinders it.
+//! Whether EtherCAT may take an interface that is not named, and what prevents that.
 //!
 //! Input: an interface of the list. Output: why not, or nothing. An interface that is not named is taken only if the
-//! host does not use it at all; every doubt hinders. The host's network must never be disturbed.
+//! host does not use it at all; every doubt prevents it. The host's network must never be disturbed.
 
 use std::fs;
 use std::path::Path;
@@ -43,7 +43,7 @@ pub fn in_use(interface: &Interface) -> Option<String> {
     }
     let warnings = exclusive_use(name);
     if let Some(warning) = warnings.into_iter().find(|it| !matches!(it, UseWarning::SmallMtu { .. })) {
-        // Without its advice: nothing of the host is to be changed for an interface that was not named.
+        // Without the advice in the warning: nothing of the host is to be changed for an interface that was not named.
         return warning.to_string().split(';').next().map(str::to_owned);
     }
     if has_route_v4(&read("/proc/thread-self/net/route"), name) {

@@ -1,9 +1,9 @@
 //! Lines for the operator about a bus, as users search for them: link, SubDevices, states, scans, working counters, and
 //! once a second what was lost; messages of the debug level (`ethercat debug`); the loss of the bus.
 //!
-//! [`Lines`] decides what is worth a line; [`BusLog`] takes samples and events ten times a second in a thread of its
+//! [`Lines`] decides which lines are printed; [`BusLog`] takes samples and events ten times a second in a thread of its
 //! own, and passes the lines on. The process that drives a bus has one: the daemon, a program with the C interface, and
-//! a Rust application that wants it. Neither touches the cyclic path.
+//! a Rust application that uses it. Neither touches the cyclic path.
 
 mod lines;
 
@@ -24,16 +24,16 @@ use crate::services::Services;
 use crate::supervisor_thread::SupervisorThread;
 use crate::text::message;
 
-/// Interval of looks.
+/// Interval of checks.
 const LOOK: Duration = Duration::from_millis(100);
-/// Looks between two summaries.
+/// Checks between two summaries.
 const LOOKS_PER_SUMMARY: u32 = 10;
 /// Stack of the thread.
 const STACK_BYTES: usize = 256 << 10;
-/// Most messages of the debug level in a look.
+/// Most messages of the debug level in one check.
 const MOST_MESSAGES: usize = 500;
 
-/// What a bus log follows.
+/// The source of a bus log.
 #[derive(Clone, Debug)]
 pub struct Followed {
     supervisor: SupervisorThread,

@@ -25,9 +25,9 @@ struct State {
 /// An interface that the daemon is to make.
 #[derive(Debug)]
 enum Ordered {
-    /// It has not answered.
+    /// The daemon has not answered.
     Waits,
-    /// It does not, because of this.
+    /// The daemon does not make it, for this reason.
     Refused(String),
 }
 

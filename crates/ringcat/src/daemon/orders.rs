@@ -22,7 +22,7 @@ pub(super) struct Orders {
 }
 
 impl Orders {
-    /// None waits.
+    /// No order waits.
     ///
     /// # Errors
     /// The process has no more descriptors.

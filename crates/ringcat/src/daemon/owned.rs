@@ -31,7 +31,7 @@ use crate::supervisor_thread::SupervisorThread;
 
 /// The daemon answers to a release within this time, unless it is stopped.
 const RELEASE: Duration = Duration::from_secs(2);
-/// Interval of looks for its answer.
+/// Interval of checks for its answer.
 const PAUSE: Duration = Duration::from_micros(200);
 /// Events of scans that are kept between two looks: one is enough to tell that there were any.
 const KEPT: usize = 1;
@@ -143,7 +143,7 @@ impl OwnedBus {
         self.links = Some(links);
     }
 
-    /// Whether this process has the bus still: a loss without a release shows here, for any thread.
+    /// Whether this process still has the bus: a loss without a release shows here, for any thread.
     pub fn ownership(&self) -> &OwnershipWatch {
         &self.ownership
     }
@@ -180,7 +180,7 @@ impl OwnedBus {
         let is_answered = receiver.is_finished();
         // A daemon that is stopped finds the end of the connection when it goes on. All threads end by it.
         self.connection.shut_down();
-        // Its panic was reported by itself.
+        // The panic handler has reported its panic.
         let _ = receiver.join();
         match before {
             Ownership::TakenBack => Err(DaemonError::TakenBack { cause: self.ownership.cause().to_owned() }),

@@ -1,4 +1,4 @@
-//! Whether a process has its bus still, for any thread of it.
+//! Whether a process still has its bus, for any thread of it.
 
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -7,13 +7,13 @@ use std::sync::{Arc, OnceLock};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Ownership {
-    /// It has it.
+    /// The process has the bus.
     Held,
-    /// It has it, and the daemon has ended: a new one waits for the end of this process.
+    /// The process has the bus, and the daemon has ended: a new daemon waits for the end of this process.
     DaemonEnded,
     /// The daemon drives the bus again: what this process sends reaches no SubDevice.
     TakenBack,
-    /// It has given it back.
+    /// The process has given the bus back.
     Released,
 }
 
@@ -52,7 +52,7 @@ impl OwnershipWatch {
 
     /// The daemon has taken the bus back.
     pub(super) fn taken_back(&self, cause: String) {
-        // It is said once.
+        // The first cause is kept.
         let _ = self.0.cause.set(cause);
         self.leave_held(Ownership::TakenBack);
     }

@@ -17,7 +17,7 @@ use crate::supervisor_thread::SupervisorThread;
 const STACK_BYTES: usize = 256 << 10;
 /// Threads for questions that a mailbox answers, and so questions to slow SubDevices at a time.
 const SLOW: usize = 3;
-/// Threads for all others: slow SubDevices keep no register and no state waiting.
+/// Threads for all other questions: slow SubDevices do not delay those about registers and states.
 const QUICK: usize = 1;
 /// Questions that wait for a thread. The daemon has no more under way.
 const WAITING: usize = 16;

@@ -21,7 +21,7 @@ use crate::supervisor_thread::SupervisorThread;
 
 /// Stack of the thread: a program may have locked its memory, and with it this.
 const STACK_BYTES: usize = 512 << 10;
-/// Interval of looks for new events of scans.
+/// Interval of checks for new events of scans.
 const LOOK: Duration = Duration::from_millis(200);
 
 /// The thread that receives what the daemon says.
@@ -108,7 +108,7 @@ impl Receiver {
         }
     }
 
-    /// If the daemon is gone the next look finds that.
+    /// The next check finds that the daemon has ended, if it has.
     fn tell(&self, message: Message) {
         let _ = self.connection.send(&message);
     }

@@ -91,7 +91,7 @@ fn start_state(supervisor: &SupervisorThread, position: u16, state: u8) -> Answe
     let begun = supervisor.act(move |engine| {
         let requested = engine.start_state_request(Position(position), state);
         engine.spawn(async move {
-            // An event tells of its failure.
+            // An event reports its failure.
             let _ = requested.ended().await;
         });
     });

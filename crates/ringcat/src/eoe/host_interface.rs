@@ -44,7 +44,7 @@ impl HostInterface for TapInterface {
     }
 }
 
-/// An interface that outlasts its place here.
+/// An interface that outlasts this MainDevice.
 pub(super) struct Lasting(pub TapInterface);
 
 impl HostInterface for Lasting {

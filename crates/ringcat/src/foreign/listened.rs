@@ -10,7 +10,7 @@ use super::{Heard, LISTEN};
 /// Two MainDevices that begin at the same time do not listen equally long: the one that has to listen longer hears the
 /// other. Up to this time is added.
 const SPREAD: Duration = Duration::from_millis(250);
-/// Interval of looks of a thread that waits.
+/// Interval of checks of a thread that waits.
 const LOOK: Duration = Duration::from_millis(1);
 
 /// The sockets with which a segment is listened to.
@@ -26,7 +26,7 @@ pub trait ListeningSockets: fmt::Debug + Send + Sync {
 pub enum ListenedPhase {
     /// No link has a carrier: nothing can be heard.
     NoCarrier,
-    /// It is listened to.
+    /// Frames are listened for.
     Listening,
     /// Another MainDevice drives it, whose first frame was this.
     Occupied(Heard),
@@ -52,7 +52,7 @@ impl Default for Listened {
 }
 
 impl Listened {
-    /// Nothing was heard yet, and it is listened for this time.
+    /// Nothing was heard yet; the listening takes this time.
     pub fn lasting(lasts: Duration) -> Listened {
         Listened { phase: Mutex::new(ListenedPhase::NoCarrier), lasts }
     }
@@ -79,7 +79,7 @@ impl Listened {
         }
     }
 
-    /// Waits while it is listened to, up to this limit.
+    /// Waits until the listening ends, up to this limit.
     pub fn wait(&self, limit: Duration) {
         let begin = Instant::now();
         while self.phase() == ListenedPhase::Listening && begin.elapsed() < limit {
@@ -92,7 +92,7 @@ impl Listened {
         self.set(ListenedPhase::Free);
     }
 
-    /// The links are others from now on.
+    /// Other links are used from now on.
     pub fn forget(&self) {
         self.set(ListenedPhase::NoCarrier);
     }
@@ -101,7 +101,7 @@ impl Listened {
         *self.lock() = phase;
     }
 
-    /// How long it is listened.
+    /// How long the listening takes.
     pub(super) const fn lasts(&self) -> Duration {
         self.lasts
     }

@@ -14,11 +14,11 @@ use super::{Heard, LAST_FRAMES, Listened, ListenedPhase, ListeningSockets, has_c
 use crate::links::{Links, PerLink};
 use crate::text::address_of_sender;
 
-/// Interval of looks while it is listened: of two that begin at once, the first one is heard by the other.
+/// Interval of checks while listening: of two MainDevices that begin at once, one hears the first one that sends.
 const LOOK: Duration = Duration::from_millis(1);
 /// The same while there is nothing to hear, or another MainDevice is heard.
 const LONG_LOOK: Duration = Duration::from_millis(5);
-/// Frames that a look takes at most from each half.
+/// Frames that a check takes at most from each half.
 const FRAMES: usize = 256;
 
 /// Links of an acyclic half that send nothing, and report no carrier, before they have been listened to with a carrier
@@ -84,7 +84,7 @@ impl<L: Links> QuietLinks<L> {
         }
     }
 
-    /// The end of a wait: while it is listened, the next look.
+    /// The end of a wait: while listening, the next check.
     fn end_of(&self, now: Instant, until: Instant) -> Instant {
         let Some(Quiet { silence, .. }) = &self.quiet else { return until };
         let is_listening = silence.listened.phase() == ListenedPhase::Listening;

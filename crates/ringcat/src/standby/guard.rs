@@ -33,7 +33,7 @@ use watch::{Order, RELEASED, UNTIMED};
 const START: Duration = Duration::from_secs(5);
 /// The process ends within this time after it was released.
 const END: Duration = Duration::from_secs(1);
-/// Interval of looks whether it has ended.
+/// Interval of checks whether it has ended.
 const END_LOOK: Duration = Duration::from_millis(1);
 /// A program beats so often in the limit of its guard.
 const BEATS_PER_LIMIT: u32 = 4;

@@ -14,7 +14,7 @@ use ringcat_wire::frame::MacAddress;
 /// Fewer cycles without process data may be those of a single fault of a cable.
 const LEAST_CYCLES: u32 = 3;
 
-/// What an ACTIVE does that meets another ACTIVE (protocol MR-10).
+/// What an ACTIVE does that receives frames of another ACTIVE (protocol MR-10).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum OnCollision {

@@ -1,8 +1,8 @@
 //! What the variables of a configuration file mean.
 //!
-//! In: assignments. Out: a [`Conf`], and mistakes. Each variable of the IgH manual (7.4.2) has an effect, or a
-//! sentence that explains why it has none; of several assignments of one variable the last one is used, as in `sh`. An
-//! unknown name with a known begin is a mistake: a misspelt setting must not be silently without effect.
+//! In: assignments. Out: a [`Conf`], and mistakes. Each variable of the IgH manual (7.4.2) has an effect, or a sentence
+//! that explains why it has none; of several assignments of one variable the last one is used, as in `sh`. An unknown
+//! name with a known beginning is a mistake: a misspelt setting must not be silently without effect.
 
 mod own;
 

@@ -15,7 +15,7 @@ use ringcat_control::message::Snapshot;
 use crate::bench::{LONG, copy_program, directory, ring, turn};
 
 pub const PROGRAM: &str = env!("CARGO_BIN_EXE_ringcatd");
-/// A user without a right.
+/// A user without privileges.
 pub const UNPRIVILEGED: u32 = 65_534;
 
 /// How the program is started.

@@ -1,4 +1,5 @@
-//! What users may do by the mode of the socket: root, a member of the group, a stranger, each in a process of its own.
+//! What users may do by the mode of the socket: root, a member of the group, another user, each in a process of its
+//! own.
 
 use std::os::unix::process::CommandExt;
 use std::path::Path;

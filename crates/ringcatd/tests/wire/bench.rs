@@ -17,7 +17,7 @@ use ringcat::daemon::Client;
 use crate::roles::{ADDRESS, LINKS, PLACE, ROLE, TEST};
 
 pub const LONG: Duration = Duration::from_secs(20);
-/// A user without a right.
+/// A user without privileges.
 const USER: &str = "65534";
 /// A ring of three.
 pub const RING: &str = "[segment]\nring = true\n[[device]]\ntype = \"digital-output-8\"\n[[device]]\n\
@@ -138,7 +138,7 @@ impl Bench {
         self.start_program(&[env!("CARGO_BIN_EXE_ringcatd")], options, socket)
     }
 
-    /// The same as a user without a right.
+    /// The same as a user without privileges.
     pub fn start_daemon_as_user(&mut self, options: &[&str]) -> usize {
         let program = self.place.join("ringcatd");
         copy_program(env!("CARGO_BIN_EXE_ringcatd").as_ref(), &program);
@@ -244,7 +244,7 @@ impl Bench {
         command
     }
 
-    /// An application without a right.
+    /// An application without privileges.
     pub fn application(&mut self, role: &str) -> Application {
         let user = ["prlimit", "--core=unlimited", "setpriv", "--reuid", USER, "--regid", USER, "--clear-groups"];
         let mut application = self.role(&self.near, role, &user).stdin(Stdio::piped()).spawn().expect("it starts");

@@ -40,7 +40,7 @@ fn has_flag_up(bench: &Bench, name: &str) -> bool {
     flags.split(',').any(|flag| flag == "UP")
 }
 
-/// The one-second looks of the daemon pass a few times.
+/// The daemon makes its checks of each second a few times.
 fn stays(bench: &Bench, what: &str, holds: impl Fn(&Bench) -> bool) {
     let begin = Instant::now();
     while begin.elapsed() < Duration::from_millis(2500) {
@@ -109,7 +109,7 @@ fn an_interface_that_was_chosen_is_left_when_the_host_begins_to_use_it() {
     ip(&format!("-n {near} address flush dev near0"));
     bench.wait_until("it is taken again", || used(&bench) == [index(&bench, "near0")]);
     bench.wait_for(AlState::PreOp);
-    // A machine that runs keeps its bus, and is led to the safe state at its end.
+    // A machine that runs keeps its bus, and its SubDevices are brought to the safe state at its end.
     let mut child = bench.application("killed");
     bench.wait_for(AlState::Op);
     let before = bench.lines().len();

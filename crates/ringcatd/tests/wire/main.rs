@@ -1,6 +1,6 @@
 //! The daemon on network interfaces: veth pairs between two namespaces, as root with `RINGCAT_ON_THE_WIRE=1`.
 //!
-//! The segment, the daemon and the applications are processes; the applications run as a user without a right.
+//! The segment, the daemon and the applications are processes; the applications run as a user without privileges.
 
 mod bench;
 mod devices;

@@ -36,7 +36,7 @@ const MOST_TIMES: usize = 100_000;
 pub const MEMORY: usize = 64 << 20;
 /// A web server answers within this time.
 const FETCH: Duration = Duration::from_secs(2);
-/// Interval of looks for interfaces.
+/// Interval of checks for interfaces.
 const LOOK: Duration = Duration::from_millis(5);
 
 /// Without the variable that makes it one there is nothing to be done.

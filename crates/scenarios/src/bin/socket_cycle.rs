@@ -5,7 +5,7 @@
 //! work of the application's thread: wait for the frames, receive, evaluate, copy, work, pack, send, publish, sleep.
 //! Callgrind counts only within the function of a measured cycle, after a warm-up, so start-up and the supervisor
 //! thread are excluded. The figure is the lower quartile of ten batches of 50 cycles: a machine that does other work
-//! makes frames late under valgrind, and late cycles take longer ways, never shorter ones. The mean of all is printed
+//! makes frames late under valgrind, and late cycles take more instructions, never fewer. The mean of all is printed
 //! beside it. Valgrind does not instrument the vDSO: clock reads are counted separately, as calls. The simulated
 //! segment delays frames, so that each cycle sleeps in spite of the slow valgrind.
 //!
@@ -30,7 +30,7 @@ const COUNTED: u64 = 500;
 /// Period of the CPU time measurement, and under valgrind.
 const PERIOD_US: u64 = 1_000;
 /// Period of two threads under valgrind. Nothing in a cycle depends on it, but valgrind cannot keep up with 1 ms there:
-/// frames are late, and late cycles take longer ways (50 servos: 1,093 to 1,329 instructions at 1 ms).
+/// frames are late, and late cycles take more instructions (50 servos: 1,093 to 1,329 instructions at 1 ms).
 const SLOW_PERIOD_US: u64 = 4_000;
 /// Delay of a frame in the simulated segment under valgrind: longer than the rest of its cycle.
 const RESIDENCE_NS: u64 = 300_000;

@@ -1,4 +1,4 @@
-//! Two MainDevices at one ring: the INACTIVE follows, takes over without a SubDevice that notices, and is handed the
+//! Two MainDevices at one ring: the INACTIVE follows, takes over while all SubDevices stay in OP, and is handed the
 //! role over (protocol 9.6 to 9.10).
 
 mod adoption;

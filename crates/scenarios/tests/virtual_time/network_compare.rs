@@ -1,5 +1,5 @@
-//! `compare` marks the differences that prevent OP: the same network is activated on the simulated bus, and whether it
-//! reaches OP judges the marks.
+//! `compare` marks the differences that prevent OP: the same network is activated on the simulated bus, and has to
+//! reach OP exactly if no difference is marked.
 
 use std::time::Duration;
 
@@ -50,7 +50,7 @@ fn reaches_op(main_device: MainDevice<SimulatedSegment>, declaration: Declaratio
     application.wait_until_op(LIMIT).is_ok()
 }
 
-/// The differences of a network on a bus, judged by the bus.
+/// The differences of a network on a bus, whose marks are checked on the bus.
 fn judged(network: &LoadedNetwork, types: &[&str]) -> Vec<Difference> {
     let (main_device, scan) = scanned(types);
     let differences = network.configuration.differences(found(&scan), &network.stated());

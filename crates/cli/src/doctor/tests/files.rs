@@ -5,7 +5,7 @@ use std::fs;
 use super::super::finding::{Finding, Level};
 use super::specimen::{Specimen, assert_finding, with};
 
-/// One fault in a file: the finding, how bad it is, what it says, and what mends it.
+/// One fault in a file: the finding, how bad it is, what it says, and what corrects it.
 type Fault = (&'static str, Level, &'static str, &'static str, &'static [(&'static str, &'static str)]);
 
 const CPU: &str = "sys/devices/system/cpu";

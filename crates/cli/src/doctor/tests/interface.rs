@@ -6,7 +6,7 @@ use ringcat_link::interface::{Unknown, UseWarning};
 use super::super::finding::Level;
 use super::specimen::{NAME, Specimen, assert_finding, of};
 
-/// What is changed on a good machine: the finding, how bad it is, what it says, and what mends it.
+/// What is changed on a good machine: the finding, how bad it is, what it says, and what corrects it.
 type Case = (&'static str, Level, &'static str, &'static str, fn(&mut Specimen));
 
 /// The link, and what else uses it.

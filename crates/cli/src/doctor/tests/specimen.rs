@@ -52,7 +52,7 @@ impl Inspect for Specimen {
     }
 }
 
-/// Files of a machine on which nothing would hurt.
+/// Files of a machine on which nothing disturbs a MainDevice.
 pub const GOOD: [(&str, &str); 39] = [
     ("proc/1/comm", "systemd\n"),
     ("proc/77/comm", "bash\n"),

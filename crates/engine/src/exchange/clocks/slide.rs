@@ -65,8 +65,8 @@ impl Slide {
         self.shift.wrapping_sub(self.left as u64)
     }
 
-    /// Takes over the steps so far: nanoseconds by which the system time has gone back since the begin. Returns those
-    /// since the last call.
+    /// Takes over the steps so far: nanoseconds by which the system time has gone back since the beginning. Returns
+    /// those since the last call.
     pub fn take_steps(&mut self, slid: u64) -> u64 {
         let step = slid.wrapping_sub(self.slid);
         self.left = self.left.wrapping_sub(step as i64);

@@ -86,7 +86,7 @@ fn elsewhere(now: &View, before: &Found, are_as_before: &[bool], is_closed: bool
     others.map(|(_, station)| station).collect()
 }
 
-/// The end of the part that the main link reaches through ports that are as before, and the begin of that of the
+/// The end of the part that the main link reaches through ports that are as before, and the beginning of that of the
 /// redundant link.
 fn unchanged_parts(are_as_before: &[bool], main_count: usize, is_closed: bool) -> (usize, usize) {
     let count = are_as_before.len();

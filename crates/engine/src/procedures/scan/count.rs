@@ -81,7 +81,8 @@ pub(super) async fn settle(bus: &Bus, expected: &Count, settle: Duration) -> Res
     Ok(())
 }
 
-/// Counts now and then until the number is another one. Lost frames are no evidence: the last ones count none.
+/// Counts at intervals until the number differs. A lost frame is no evidence of that; `SILENT` in a row count as no
+/// SubDevice.
 pub(super) async fn until_changed(bus: &Bus, expected: &Count) -> LinkCounts {
     let mut lost = 0;
     loop {

@@ -209,7 +209,8 @@ impl Eeprom {
     }
 
     /// Polls until a command has ended, and sends the next one at once. Times count from departure to departure: a
-    /// command and its poll take the same way, so the way of a long frame through many SubDevices costs no time.
+    /// command and its poll take the same path, so the propagation time of a long frame through many SubDevices does
+    /// not count.
     async fn finish(&mut self, given: Given, next: Option<u32>) -> Result<Result<(), Failure>, SiiReadError> {
         self.bus.sleep_until(given.at + self.pace.first()).await;
         let mut early = None;

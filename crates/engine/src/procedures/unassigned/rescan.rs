@@ -132,7 +132,7 @@ fn observe_moved(segment: &SharedSegment, versions: Versions, rescan: &Rescan) {
     segment.observe(Observation::Moved { versions, moved: rescan.moved().collect() });
 }
 
-/// Also returns the versions at its begin, and whether the cabling was taken over.
+/// Also returns the versions at its beginning, and whether the cabling was taken over.
 async fn scan_until(
     bus: &Bus,
     segment: &SharedSegment,

@@ -109,7 +109,7 @@ impl Bringing<'_> {
         .await
     }
 
-    /// Has its dictionary hold what is known of it, if another owner may have written it and it cannot be read.
+    /// Writes what is known of its dictionary into it, if another owner may have written it and it cannot be read.
     /// What it refuses stays: its application decides about SAFEOP.
     async fn assign_pdos(&self) -> Result<(), ConfigureError> {
         if self.info.pdo_source != PdoSource::Outdated || !self.mailbox.is_open() {

@@ -26,7 +26,7 @@ pub enum IdleObservation<'a> {
     RescanAsked,
     /// The scan after a change has ended.
     Followed {
-        /// Version of the model at its begin.
+        /// Version of the model at its beginning.
         versions: Versions,
         /// The SubDevices.
         found: Rc<Found>,

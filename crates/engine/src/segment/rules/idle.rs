@@ -37,7 +37,7 @@ impl Segment {
         (*ended >= number).then_some(differences)
     }
 
-    /// Processes the answer to a broadcast. It is compared with what the list of SubDevices lets expect; in operation,
+    /// Processes the answer to a broadcast. It is compared with what follows from the list of SubDevices; in operation,
     /// where states change by the application's own steps, words are compared with those of the last round.
     pub(in crate::segment) fn observe_idle_words(&mut self, words: &Words, now: Instant, effects: &mut Effects) {
         self.ring.observe_carriers(words.carriers(), now, effects);

@@ -12,7 +12,7 @@ pub struct Changes {
     pub segment: u32,
     /// The ring has changed.
     pub ring: u32,
-    /// The first SubDevices answer: so it is when cycles begin, which is not a change of the segment.
+    /// The first SubDevices answer, as always when cycles begin: this is no change of the segment.
     pub beginnings: u32,
 }
 

@@ -1,4 +1,4 @@
-//! Which lines a bus is worth: decided from samples and events.
+//! Which lines are printed of a bus: decided from samples and events.
 
 use std::collections::BTreeMap;
 
@@ -8,12 +8,12 @@ use ringcat_link::operator::Priority;
 
 use crate::daemon::ownership::Ownership;
 
-/// Looks without an answer until the SubDevices count as gone: a scan knows them before the supervision does.
+/// Samples without an answer until the SubDevices count as absent: a scan knows them before supervision does.
 const SILENT_LOOKS: u32 = 3;
 /// Names of the AL states by bit.
 const STATES: [&str; 4] = ["INIT", "PREOP", "SAFEOP", "OP"];
 
-/// What is compared from look to look.
+/// What is compared from sample to sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Sample {
     /// A link is up.

@@ -42,7 +42,7 @@ fn place(address: ConfigAddress) -> (u16, u16) {
     match address {
         ConfigAddress::Position(position) => (0, position),
         ConfigAddress::Alias { alias, offset } => (alias, offset),
-        // It has no alias: its position is told where it is found.
+        // It has no alias: its position is reported where it is found.
         ConfigAddress::Identification { offset, .. } => (0, offset),
         _ => (0, 0),
     }

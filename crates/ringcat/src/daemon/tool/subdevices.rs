@@ -64,7 +64,7 @@ fn known(engine: &mut Engine, from: u16) -> (u32, Vec<StationAddress>, Vec<SubDe
     (all.len() as u32, these.clone().map(|info| info.station).collect(), these.map(line).collect())
 }
 
-/// What is known of a SubDevice. Costs no frame.
+/// What is known of a SubDevice. Needs no frame.
 pub(super) fn describe(supervisor: &SupervisorThread, position: u16) -> Result<Description, Refusal> {
     let info = subdevice(supervisor, position).info().map_err(|error| refusal(&error))?;
     info.map(|info| description(&info)).ok_or_else(|| Refusal::Service {

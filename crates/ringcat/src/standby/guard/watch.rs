@@ -17,7 +17,7 @@ pub(super) const RELEASED: u8 = b'0';
 pub(super) const UNTIMED: u8 = b'-';
 /// Looks at the heartbeat within the limit.
 const LOOKS_PER_LIMIT: u32 = 8;
-/// Shortest interval of looks.
+/// Shortest interval of checks.
 const SHORTEST_LOOK: Duration = Duration::from_micros(100);
 /// Longest order: a limit, and two names of interfaces.
 const LONGEST_ORDER: usize = 256;

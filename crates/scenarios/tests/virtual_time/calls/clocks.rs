@@ -139,9 +139,10 @@ fn assert_together(ecrt: &mut Ecrt, clocks: &[usize], reference: usize, text: &s
 /// As with an acyclic half of its own thread: the clocks are set up before the program gives a time and sends its first
 /// frame. The first time then differs from that of the set-up by anything.
 ///
-/// Without the mend of decision 0078 this fails: in `crates/engine/src/exchange/clocks.rs` take `or_else(|| ...
-/// posted_time(now))` out of the prediction. Then the reference is written once, 820,000,000 s from the application's
-/// time, and each look at it finds the same shift again (`ApplicationTime`) for as long as the program runs.
+/// Without the correction of decision 0078 this fails: in `crates/engine/src/exchange/clocks.rs` take
+/// `or_else(|| ... posted_time(now))` out of the prediction. Then the reference is written once, 820,000,000 s from the
+/// application's time, and each reading of it finds the same shift again (`ApplicationTime`) for as long as the program
+/// runs.
 // covers: 7.2, api, dc-reference
 #[test]
 fn a_first_time_between_the_set_up_and_the_first_cycle_moves_all_clocks() {

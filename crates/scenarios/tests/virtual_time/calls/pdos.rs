@@ -38,7 +38,7 @@ fn wanted(syncs: &[SyncInfo]) -> Vec<Assigned> {
     syncs.iter().map(|sync| (sync.index, pdos(sync))).collect()
 }
 
-/// All that ask see what the SubDevices in PREOP hold.
+/// The MainDevice reports what the SubDevices in PREOP hold.
 fn assert_said(ecrt: &mut Ecrt, text: &str) {
     let found = ecrt.side.engine().subdevices();
     for (at, info) in found.iter().enumerate().filter(|(_, info)| info.protocols.coe()) {
@@ -250,7 +250,7 @@ fn pdos_that_are_changed_by_sdo_beside_an_application_are_known_after_it() {
     }
 }
 
-/// The same where nothing is assigned any more, at each moment of what looks for it every 100 ms.
+/// The same where nothing is assigned any more, at each moment of the 100 ms between two checks for it.
 // covers: states, mailbox
 #[test]
 fn pdos_that_are_removed_by_sdo_right_before_the_end_are_known_after_it() {
@@ -269,7 +269,7 @@ fn pdos_that_are_removed_by_sdo_right_before_the_end_are_known_after_it() {
     }
 }
 
-/// The events of a program since the last look.
+/// The events of a program since the last call.
 fn said_by(ecrt: &mut Ecrt) -> Vec<ringcat::Event> {
     ecrt.look();
     ecrt.events.replace(Vec::new()).unwrap_or_default()

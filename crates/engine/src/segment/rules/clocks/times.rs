@@ -103,7 +103,7 @@ impl Segment {
         for node in &mut self.clocks.nodes {
             node.offset_ns = node.offset_ns.wrapping_sub(step_ns as i64);
         }
-        // The frame leaves before the next cycle, which reckons with the step.
+        // The frame leaves before the next cycle, which takes the step into account.
         self.board.clocks.times.post_slid(self.clocks.times.slid());
     }
 
