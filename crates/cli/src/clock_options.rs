@@ -29,8 +29,8 @@ pub const SYNC_LONG_HELP: &str = "SYNC signals: auto, or POSITION:SYNC0[:SYNC1] 
 pub struct ClockOptions {
     /// When cycles begin, relative to the system time of the segment
     ///
-    /// The time from the multiples of the cycle time, which is also that of an unshifted SYNC0, to the begin of a
-    /// cycle: 300us or -300us; 0us by default. Cycles then follow the reference clock (master shift).
+    /// The time from the multiples of the cycle time, which is also that of an unshifted SYNC0, to the beginning of
+    /// a cycle: 300us or -300us; 0us by default. Cycles then follow the reference clock (master shift).
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = shift, conflicts_with = "bus_shift")]
     phase: Option<i64>,
     /// The reference clock follows this host (bus shift)

@@ -174,7 +174,7 @@ pub fn describe_down(name: &str) -> String {
     if switched_off {
         format!("{name} is switched off: sudo ip link set {name} up")
     } else {
-        format!("{name} has no link: is the cable plugged in, and has the SubDevice at its other end power?")
+        format!("{name} has no link: is the cable plugged in, and does the SubDevice at its other end have power?")
     }
 }
 

@@ -35,7 +35,7 @@ const PREOP: u16 = 2;
 /// Beginning of the event of a scan that failed.
 const FAILED_SCAN: &str = "scan failed";
 /// Where no frame returns there is no scan.
-const NO_SLAVE: &str = "no slave answers: is the cable plugged in at its input, and has it power?";
+const NO_SLAVE: &str = "no slave answers: is the cable plugged in at its input, and does it have power?";
 /// The master that the daemon drives.
 const MASTER: u32 = 0;
 
@@ -209,7 +209,7 @@ fn settle(client: &mut Client, begin: Instant) -> Result<(), Failure> {
             }
         }
         if !has_link && begin.elapsed() >= LINK {
-            return Err(Failure::failed("no link: is the cable plugged in, and has the first slave power?"));
+            return Err(Failure::failed("no link: is the cable plugged in, and does the first slave have power?"));
         }
         if begin.elapsed() >= START {
             return Err(late("the slaves are not in PREOP"));

@@ -96,7 +96,7 @@ impl Setup {
         safe_states.extend(own.safe_states);
         let is_known = |safe: &&SafeState| masters.iter().any(|it| it.master == safe.master);
         if let Some(safe) = safe_states.iter().find(|safe| !is_known(safe)) {
-            return Err(format!("--safe-state names master {}, which there is not", safe.master));
+            return Err(format!("--safe-state names master {}, which does not exist", safe.master));
         }
         let mode = given.mode.or(own.mode).unwrap_or(Rights::default().mode);
         Ok(Setup {

@@ -20,7 +20,7 @@ const DEVICES: usize = 8;
 const CUT_BEHIND: usize = 4;
 /// Cycles before the cut, during the break, and after the repair.
 const CYCLES: [usize; 3] = [12, 20, 16];
-/// Time from the cut to the begin of the next cycle: ports detect the cut after 300 us, so the frames of this cycle are
+/// Time from the cut to the next cycle: ports detect the cut after 300 us, so the frames of this cycle are
 /// lost.
 const BEFORE_THE_CYCLE: Duration = Duration::from_micros(100);
 const CYCLE: Duration = Duration::from_millis(1);

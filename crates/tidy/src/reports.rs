@@ -8,7 +8,7 @@ use crate::Finding;
 use crate::tokens::{Token, tokens};
 use crate::tree::Tree;
 
-/// Files that report notices only, by the begin of their paths.
+/// Files that report notices only, by the beginning of their paths.
 const REPORTING: [&str; 3] =
     ["crates/engine/src/procedures/", "crates/engine/src/main_device", "crates/engine/src/mail/"];
 /// Executes the effects of the model, events among them.

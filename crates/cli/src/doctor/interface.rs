@@ -68,7 +68,7 @@ fn link(interface: &Interface, settings: &Settings) -> Finding {
         return LINK.bad("the interface is switched off", &[&format!("sudo ip link set {name} up")]);
     }
     if !interface.carrier {
-        return LINK.bad("there is no link partner", &["plug the cable in; has the first SubDevice power?"]);
+        return LINK.bad("there is no link partner", &["plug the cable in; does the first SubDevice have power?"]);
     }
     let is_virtual = settings.driver.as_ref().is_ok_and(|driver| VIRTUAL.contains(&driver.name.as_str()));
     match &settings.link {

@@ -98,7 +98,7 @@ impl Latency {
         let longest = self.delays.longest();
         let us = longest.as_nanos() as f64 / 1e3;
         let text = format!("of {} wake-ups the latest came {us:.1} us late; {}", self.delays.count(), self.settings());
-        let mend = ["see to the other findings, then measure under the load of operation"];
+        let mend = ["correct the other findings first, then measure under the load of operation"];
         match longest {
             _ if longest >= BAD => LATENCY.bad(text, &mend),
             _ if longest >= MINOR => LATENCY.minor(text, &mend),

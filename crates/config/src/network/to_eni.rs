@@ -77,7 +77,7 @@ fn is_scanned(of: &SubDevice) -> bool {
 fn of_file(file: &NetworkFile) -> Vec<LeftOut> {
     let mut left_out = Vec::new();
     if file.redundancy != model::Redundancy::default() {
-        let reason = "an ENI does not name rings: the MainDevice is told by its own options";
+        let reason = "an ENI does not name rings: options of the MainDevice declare them";
         left_out.push(LeftOut::new(None, "redundancy", reason));
     }
     if file.lrw == Lrw::Always && file.redundancy.ring {

@@ -16,7 +16,7 @@ pub const COMMAND: Command = Command {
     forms: &["<STATE>"],
     help: "STATE is INIT, PREOP, BOOT, SAFEOP or OP. The command does not wait until
 the slaves have reached it; with --main or --sim it does, since nothing
-leads them on after its end.
+brings them to it after its end.
 ",
     options: SELECTION,
     output: Output::Nothing,

@@ -132,7 +132,7 @@ impl Guard {
         let mut first = [0];
         let answered = self.stream.read_exact(&mut first);
         answered.map_err(|error| match error.kind() {
-            ErrorKind::UnexpectedEof => GuardError::Refused("it has ended without a word".to_owned()),
+            ErrorKind::UnexpectedEof => GuardError::Refused("it has ended without an answer".to_owned()),
             ErrorKind::WouldBlock => GuardError::Refused(format!("no answer within {} s", START.as_secs())),
             _ => error.into(),
         })?;

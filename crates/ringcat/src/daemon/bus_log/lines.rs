@@ -96,7 +96,7 @@ impl Lines {
                 (Priority::Error, told + " Calls of this process have no effect until it is requested again.")
             }
             Ownership::DaemonEnded => {
-                (Priority::Warning, "ringcatd has ended; this process drives the master on.".to_owned())
+                (Priority::Warning, "ringcatd has ended; this process continues to drive the master.".to_owned())
             }
             _ => return,
         };
