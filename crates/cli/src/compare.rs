@@ -45,7 +45,7 @@ pub struct CompareArguments {
     esi: EsiArgument,
 }
 
-/// What the file says.
+/// What the file declares.
 struct Declared {
     configuration: Configuration,
     stated: Vec<Stated>,

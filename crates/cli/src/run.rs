@@ -119,7 +119,7 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
     Ok(Report { verdict, data })
 }
 
-/// Opens the segment. The network of a file depends on whether it is a ring; with a daemon the bus says that.
+/// Opens the segment. The network of a file depends on whether it is a ring; with a daemon the bus shows that.
 fn begin(arguments: &RunArguments) -> Result<(Access, Option<ConfiguredNetwork>), Failure> {
     let ring = match arguments.access.master {
         Some(_) => None,

@@ -38,7 +38,7 @@ const SILENT: Duration = Duration::from_secs(1);
 /// An interface without a carrier this long after it was switched on is reported.
 const CARRIER_LIMIT: Duration = Duration::from_secs(5);
 
-/// Forwards, and says what; takes over with a declaration.
+/// Forwards, and reports what; takes over with a declaration.
 pub fn run(arguments: &StandbyArguments) -> Result<Report, Failure> {
     if arguments.automatic || arguments.declared.configured.is_given() {
         return takeover::run(arguments);

@@ -1,4 +1,4 @@
-//! What the command line tool `ethercat` and masters opened for questions ask, and what they get.
+//! The questions of the command line tool `ethercat` and of masters opened for questions, and the answers.
 //!
 //! Numbers are those of registers, of the SII and of dictionaries. SubDevices have their positions in the ring. Lists
 //! of SubDevices go in pieces; the largest of each is named.

@@ -40,7 +40,7 @@ pub fn with_prefix(text: &str) -> Result<(Ipv4Addr, Option<Ipv4Addr>), Failure> 
 /// A MAC address: six bytes in hexadecimal with colons or hyphens between them (manual 7.1.13).
 ///
 /// # Errors
-/// It is none.
+/// It is no MAC address.
 pub fn mac(text: &str) -> Result<[u8; 6], Failure> {
     let parts: Vec<&str> = text.split(if text.contains(':') { ':' } else { '-' }).collect();
     if parts.len() < 6 {

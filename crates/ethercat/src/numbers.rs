@@ -37,7 +37,7 @@ impl List {
         List(vec![(0, None)])
     }
 
-    /// Reads a list; `None` if it is none.
+    /// Reads a list; `None` for any other text.
     pub fn parse(text: &str) -> Option<List> {
         text.split(',').map(range).collect::<Option<_>>().map(List)
     }

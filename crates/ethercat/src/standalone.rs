@@ -51,7 +51,7 @@ const MOST_WORDS: usize = 4096;
 #[derive(Debug)]
 pub struct Standalone {
     daemon: Child,
-    /// What it says before its end.
+    /// Its messages before its end.
     standard_error: Option<JoinHandle<String>>,
 }
 
@@ -156,7 +156,7 @@ impl Drop for Standalone {
     }
 }
 
-/// Reads what the daemon says, to its end. The beginning is kept: it tells why the daemon does not start.
+/// Reads the messages of the daemon, to its end. The beginning is kept: it shows why the daemon does not start.
 fn listen_to(stderr: Option<ChildStderr>) -> Option<JoinHandle<String>> {
     let mut stderr = stderr?;
     let read = move || {

@@ -15,7 +15,7 @@ type App = Application<AnyLinks, SupervisorThread>;
 /// The place of the application.
 #[derive(Debug, Default)]
 pub enum Slot {
-    /// There is none.
+    /// There is no application.
     #[default]
     Empty,
     /// It runs.

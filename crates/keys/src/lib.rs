@@ -127,7 +127,7 @@ pub fn check_page(path: &Path, begin: &str, tables: &[Table]) {
 /// Every key has a type, a meaning and a unit.
 ///
 /// # Panics
-/// One has not.
+/// One lacks any of these.
 pub fn check_keys(tables: &[Table]) {
     for (heading, keys) in tables {
         for Key { path, kind, meaning } in keys {

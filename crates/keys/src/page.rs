@@ -15,7 +15,7 @@ impl Page {
     /// Reads the text of a page.
     ///
     /// # Panics
-    /// A row is none.
+    /// A row has another form.
     pub fn read(text: &str) -> Page {
         let mut tables: BTreeMap<String, Keys> = BTreeMap::new();
         let mut heading = String::new();

@@ -2,7 +2,7 @@
 //!
 //! In: a descriptor of the memory, made by the process that gives the heartbeat. Out: a number that changes with each
 //! beat. To give a beat is a write into memory: no system call, no lock, so it is for the cyclic path too. The process
-//! that watches can revoke what the other one has; the next beat tells that.
+//! that watches can revoke what the other one has; the next beat shows that.
 
 use std::fs::File;
 use std::io::{self, ErrorKind};

@@ -1,6 +1,6 @@
 //! Lines for the operator of a machine: on the standard error, and in the journal of the system where there is one.
 //!
-//! [`OperatorLines::write`] never waits: a line that nothing takes is lost, and the next one says how many were. The
+//! [`OperatorLines::write`] never waits: a line that nothing takes is lost, and the next one states how many were. The
 //! journal gets a datagram for each line (its native protocol); where the standard error leads to the journal already,
 //! a line has its priority in front instead, and there is no datagram. Not for the cyclic path.
 
@@ -87,7 +87,7 @@ impl OperatorLines {
     }
 }
 
-/// What is said of lines that were lost.
+/// The line about lines that were lost.
 pub fn lost_lines(count: u64) -> String {
     match count {
         1 => "1 line was lost: nothing took it".to_owned(),

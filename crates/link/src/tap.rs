@@ -154,7 +154,7 @@ impl TapInterface {
     /// An interface whose descriptor another process has passed on. No privilege is needed.
     ///
     /// # Errors
-    /// The descriptor is none of a TAP interface.
+    /// The descriptor is not that of a TAP interface.
     pub fn adopt(fd: OwnedFd) -> Result<TapInterface, TapError> {
         let failed = |errno| TapError::from_errno("a descriptor", "going on with an interface", errno);
         // The kernel writes the whole of it.

@@ -202,7 +202,7 @@ impl SupervisorThread {
     }
 
     /// The same with interfaces that outlast this MainDevice: `source` gives a duplicate of the one with this name and
-    /// address, makes it, or says that it is not there yet, and is then asked again. It runs in the thread of the
+    /// address, makes it, or reports that it is not there yet, and is then called again. It runs in the thread of the
     /// acyclic half and must not wait.
     ///
     /// # Errors

@@ -22,7 +22,7 @@ const LEAST_AGE: Duration = Duration::from_millis(1);
 #[derive(Debug, Default)]
 pub(crate) struct OfTwo {
     pub forwarder: Option<StoreAndForward>,
-    /// This MainDevice was ACTIVE when this was asked last.
+    /// This MainDevice was ACTIVE at the last check.
     was_active: bool,
     /// When it became INACTIVE last.
     pub inactive_since: Instant,

@@ -66,7 +66,7 @@ fn events_reach_a_subscriber_once_with_their_levels() -> Result<(), Box<dyn Erro
     for _ in 0..100 {
         application.cycle(|_| ());
     }
-    // Taking events tells those that came meanwhile; those that were kept are not reported again.
+    // Taking events reports those that came meanwhile; those that were kept are not reported again.
     while application.pop_event().is_some() {}
     let lines = lines.0.lock().expect("no panic");
     let count = |level: Level, text: &str| lines.iter().filter(|line| line.0 == level && line.1 == text).count();

@@ -7,7 +7,7 @@ use crate::device::{Device, Found};
 use crate::setup::Setup;
 use crate::source::Source;
 
-/// Lines that say what each variable means, where the daemon would listen, and how its interfaces are now.
+/// Lines that state what each variable means, where the daemon would listen, and how its interfaces are now.
 pub fn lines(conf: &Conf, setup: &Setup, socket: &str) -> Vec<String> {
     let mut lines: Vec<String> =
         conf.understood.iter().map(|Understood { line, name, text }| format!("line {line}: {name}: {text}")).collect();

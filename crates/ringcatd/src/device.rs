@@ -82,7 +82,7 @@ fn address(text: &str) -> Option<[u8; 6]> {
 }
 
 impl Device {
-    /// Whether it is this interface; the first one is none before it is found.
+    /// Whether it is this interface; false for the first free one before it is found.
     pub fn is(&self, interface: &Interface) -> bool {
         match self {
             Device::Name(name) => *name == interface.name,

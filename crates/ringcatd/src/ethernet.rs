@@ -26,7 +26,7 @@ pub struct EthernetInterfaces {
 }
 
 impl EthernetInterfaces {
-    /// None is made yet.
+    /// No interface is made yet.
     pub fn new(master: u32) -> EthernetInterfaces {
         EthernetInterfaces { master, made: Mutex::default() }
     }
@@ -38,7 +38,7 @@ impl EthernetInterfaces {
     /// A duplicate of the interface with this name, which is made if it is not there.
     ///
     /// # Errors
-    /// It cannot be made, or is none of this master.
+    /// It cannot be made, or its name or address is not one of this master.
     pub fn make(&self, name: &str, mac: [u8; 6]) -> Result<TapInterface, TapError> {
         let refused = |cause: &str| TapError::Refused { name: name.to_owned(), cause: cause.to_owned() };
         if !is_of(name, self.master) || mac[0] & KIND != LOCAL {

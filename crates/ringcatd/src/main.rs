@@ -41,7 +41,7 @@ struct Arguments {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Role {
     Daemon,
-    /// A process of the daemon, which tells the operator itself.
+    /// A process that the daemon has started, which reports its failures.
     Part,
 }
 
@@ -63,7 +63,7 @@ fn main() -> ExitCode {
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        // The daemon says what the other process has said.
+        // The daemon reports the error of the other process.
         Err(_) if role == Role::Part => ExitCode::from(2),
         Err(error) => {
             error.lines().for_each(|line| say(format_args!("{line}")));

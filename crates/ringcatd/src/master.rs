@@ -24,9 +24,9 @@ use crate::owner::{Answered, OwnerLink};
 use crate::owner_lock::OwnerLock;
 use crate::wires::Wires;
 
-/// An owner is told within this time that the daemon has failed.
+/// The message that the daemon has failed reaches an owner within this time.
 const TELL: Duration = Duration::from_millis(100);
-/// What it is told, and the operator.
+/// This message, also for the operator.
 const FAILED: &str = "a thread of the daemon has failed";
 
 /// How a master is driven.

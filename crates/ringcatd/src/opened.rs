@@ -59,7 +59,7 @@ impl Opened {
     /// Sockets that get these interfaces, as far as they are there.
     ///
     /// # Errors
-    /// None is there, one is no Ethernet interface, or there are not two sockets for each; for the operator.
+    /// No interface is there, one is no Ethernet interface, or there are not two sockets for each; for the operator.
     pub fn interfaces(devices: &[Device], sockets: Vec<OwnedFd>) -> Result<Opened, String> {
         let failed = |error: LinkError| error.to_string();
         let mut followed = Vec::new();

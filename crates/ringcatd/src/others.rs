@@ -22,7 +22,7 @@ pub struct Others {
 }
 
 impl Others {
-    /// None is known. A segment that is not shared has none.
+    /// No other MainDevice is known. A segment that is not shared has none.
     pub fn new(master: u32, is_shared: bool) -> Others {
         let listened = Arc::new(if is_shared { Listened::default() } else { Listened::not_shared() });
         Others { master, listened, is_told: AtomicBool::new(false) }

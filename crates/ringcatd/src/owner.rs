@@ -34,7 +34,7 @@ pub struct OwnerLink {
     /// It moves frames of EoE.
     moves_ethernet: bool,
     connection: Arc<Connection>,
-    /// Readable when its process has ended; of a process in another name space there is none.
+    /// Readable when its process has ended; there is no such descriptor of a process in another name space.
     end: Option<OwnedFd>,
     questions: Mutex<Questions>,
     changed: Condvar,

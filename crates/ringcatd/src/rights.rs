@@ -1,6 +1,6 @@
 //! What a client may do: by the credentials of its process when it connected.
 //!
-//! The mode has the meaning that it has for a file: its bits say for the user of the daemon, for the members of the
+//! The mode has the meaning that it has for a file: its bits state for the user of the daemon, for the members of the
 //! group and for all others whether they may read (`r`) and change the bus (`w`). `connect` needs the right to write a
 //! socket's file, so the file gets both bits for all that may do anything. Root may change the bus in any case.
 
@@ -56,7 +56,7 @@ impl Rights {
     }
 }
 
-/// What the bits of a class allow. Without the right to read there is none.
+/// What the bits of a class allow. Without the right to read nothing is allowed.
 fn right(class: u32) -> Option<Right> {
     match class & (READ | CHANGE) {
         bits if bits == READ | CHANGE => Some(Right::Change),

@@ -109,7 +109,7 @@ pub fn serve(master: &Master, owner: &OwnerLink, mut signs: Signs, stop_limit: D
     }
 }
 
-/// Takes what an owner says; how its time has ended, if it has given the master back.
+/// Takes the messages of an owner; how its time has ended, if it has given the master back.
 fn take_message(master: &Master, owner: &OwnerLink, message: Message) -> Option<End> {
     match message.content {
         Content::Underway { id } => owner.taken(id),

@@ -167,7 +167,7 @@ impl Two {
         }
     }
 
-    /// A controller dies: it does nothing any more, and its links go down.
+    /// A controller fails: it does nothing any more, and its links go down.
     pub fn kill(&mut self, number: usize) {
         self.controllers[number].is_dead = true;
         self.links_of(number).into_iter().for_each(|link| self.network.disconnect(link, true));
@@ -178,7 +178,7 @@ impl Two {
         if number == 0 { [HostLink::Main, HostLink::Redundant] } else { HostLink::SECOND }
     }
 
-    /// A controller that was dead begins anew.
+    /// A controller that has failed begins anew.
     pub fn revive(&mut self, number: usize) {
         let now = self.now();
         self.controllers[number].begin_anew(now);

@@ -7,7 +7,7 @@
 //! * [`al`]: states of the EtherCAT state machine and AL status codes;
 //! * [`sii`]: SubDevice information (EEPROM), reader and writer;
 //! * [`mailbox`]: the mailbox header, CoE, FoE, EoE, SoE, AoE, VoE, messages of a mailbox gateway;
-//! * `master_frame` (feature `standby`): what the two MainDevices of a ring tell each other in each cycle;
+//! * `master_frame` (feature `standby`): what the two MainDevices of a ring send each other in each cycle;
 //! * [`time`], [`address`]: newtypes.
 //!
 //! # Panic contract

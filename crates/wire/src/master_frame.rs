@@ -1,4 +1,4 @@
-//! Cyclic master frames: what the two MainDevices of a ring tell each other in each cycle (protocol 9.8).
+//! Cyclic master frames: what the two MainDevices of a ring send each other in each cycle (protocol 9.8).
 //!
 //! A master frame holds NOP datagrams at ADP 0 and ADO 0x4155 only, so that SubDevices pass it unchanged. Each datagram
 //! is a fragment of one area ([`Area`]): a head ([`FragmentHead`]), then bytes of the area. One direction per area

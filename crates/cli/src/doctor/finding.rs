@@ -1,6 +1,6 @@
 //! The finding of a check, and its text for people.
 //!
-//! A [`Topic`] is one thing that is checked, with why it matters; its findings say how it is on this machine. Texts
+//! A [`Topic`] is one thing that is checked, with why it matters; its findings state how it is on this machine. Texts
 //! come from files of the machine in part, so control characters and length are limited here.
 
 use std::fmt::Display;
@@ -141,7 +141,7 @@ impl Finding {
     }
 }
 
-/// The list for people, the worst first; of the good ones only names, unless `all` are wanted.
+/// The list for people, the worst first; of the good ones only names, unless `all` are to be printed.
 pub fn lines(findings: &[Finding], all: bool) -> Vec<String> {
     let of = |level: Level| findings.iter().filter(move |finding| finding.level == level);
     let shown = Level::ALL.into_iter().filter(|level| all || *level != Level::Good);

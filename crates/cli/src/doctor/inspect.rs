@@ -166,7 +166,7 @@ impl Inspect for Machine {
     }
 }
 
-/// The text of a file, or `None` where it is not there, which says something too.
+/// The text of a file, or `None` where it is not there, which is a result too.
 pub fn read_if_there(machine: &dyn Inspect, path: &str) -> Result<Option<String>, Unseen> {
     match machine.read(path) {
         Ok(text) => Ok(Some(text)),

@@ -2,7 +2,7 @@
 //!
 //! The thread sleeps until the times of a grid of 1 ms, as a cycle with `--receive block` does. It has what
 //! `ringcat run --priority` gives: SCHED_FIFO, locked memory, processors that stay awake. All of it ends with the
-//! measurement. What is not permitted is left out, as in `ringcat run`, and is said.
+//! measurement. What is not permitted is left out, as in `ringcat run`, and is reported.
 
 use std::thread;
 use std::time::Duration;

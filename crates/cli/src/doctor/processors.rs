@@ -137,7 +137,7 @@ fn isolated(machine: &dyn Inspect) -> Result<Finding, Unseen> {
 
 fn tick(machine: &dyn Inspect) -> Result<Finding, Unseen> {
     let path = format!("{PROCESSORS}/nohz_full");
-    // Without the directory, its absence says nothing.
+    // Without the directory, its absence shows nothing.
     online(machine)?;
     let text = match inspect::read_if_there(machine, &path)? {
         None => {

@@ -1,4 +1,4 @@
-//! What is declared: the network of a file, or the SubDevices found as their SIIs say.
+//! What is declared: the network of a file, or the SubDevices found as their SIIs describe them.
 
 use std::time::Duration;
 
@@ -26,7 +26,7 @@ pub struct DeclarationArguments {
 }
 
 impl DeclarationArguments {
-    /// The declaration: the network of the file, or the SubDevices found as their SIIs say.
+    /// The declaration: the network of the file, or the SubDevices found as their SIIs describe them.
     pub fn declare(
         &self,
         network: Option<&ConfiguredNetwork>,
@@ -52,7 +52,7 @@ impl DeclarationArguments {
     }
 }
 
-/// When PDOs are read. A file that declares all SyncManagers says what PDOs there are.
+/// When PDOs are read. A file that declares all SyncManagers states which PDOs there are.
 pub fn pdos(network: Option<&ConfiguredNetwork>) -> ReadPdos {
     if network.is_some_and(ConfiguredNetwork::is_complete) { ReadPdos::Never } else { ReadPdos::default() }
 }

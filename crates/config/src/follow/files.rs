@@ -19,7 +19,7 @@ pub(super) struct Transfer<'a> {
     pub action: Result<StartupAction, String>,
 }
 
-/// The transfers of the commands of a SubDevice. A disabled request is none, and neither are the packets behind it.
+/// The transfers of the commands of a SubDevice. A disabled request is left out, and so are the packets behind it.
 pub(super) fn transfers(commands: &[RawMailCommand]) -> Vec<Transfer<'_>> {
     let mut rest = commands.iter().filter(|command| command.protocol == PROTOCOL).peekable();
     let mut found = Vec::new();

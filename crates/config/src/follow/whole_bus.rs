@@ -128,7 +128,7 @@ fn sent(command: &EcatCommand, addresses: &Addresses<'_>) -> Result<Way, String>
         }
         Class::Raw => {}
     }
-    // A broadcast returns the OR of all registers: only 0 says something about a single one.
+    // A broadcast returns the OR of all registers: only 0 is information about a single one.
     if let Some(validate) = command.validate.as_ref().filter(|_| code == Command::Brd)
         && validate.data.iter().any(|byte| *byte != 0)
     {

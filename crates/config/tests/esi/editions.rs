@@ -1,5 +1,5 @@
 //! Editions of the schema (protocol ES-09): what each added is read or named as not used, and none changes what the
-//! others say; what no edition has is a notice, at any element.
+//! others state; what no edition has is a notice, at any element.
 
 use ringcat_config::esi::{self, Transition};
 

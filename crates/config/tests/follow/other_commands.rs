@@ -119,7 +119,7 @@ fn messages_of_aoe_and_voe_are_sent_and_other_bytes_are_noted() {
     let voe = MailMessage::Voe(vec![0x47, 0x0C, 0, 0, 7, 0, 0xAA]);
     assert_eq!(action("VoE"), Some(StartupAction::Mail(voe)));
     assert_eq!(commented(&config, "AoE")[0].limit, Some(std::time::Duration::from_millis(70)));
-    // The answer to a request is none.
+    // The answer to a request is no request.
     let wrong = [command("AoE", &AMS.replace("04000400", "04000500")), command("VoE", "470c")].concat();
     let wrong = changed(&[(MAILBOX, &wrong)]);
     for (subject, reason) in

@@ -77,7 +77,7 @@ impl PdoPlan {
         self.wanted.pdos.iter().filter(|pdo| !held.mapped.contains(pdo))
     }
 
-    /// The downloads that bring a dictionary from what it holds to what is wanted, as far as the SubDevice permits.
+    /// The downloads that bring a dictionary from what it holds to what is planned, as far as the SubDevice permits.
     pub(crate) fn downloads(&self, held: &HeldPdos) -> Vec<SdoDownload> {
         let changed: Vec<&PdoMapping> = self.changed(held).filter(|_| self.can_map()).collect();
         // The mapping of an assigned PDO cannot be changed.

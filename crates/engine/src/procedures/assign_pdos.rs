@@ -1,4 +1,4 @@
-//! PDOs in the dictionary of a SubDevice in PREOP: compared with what is wanted, and written where they differ
+//! PDOs in the dictionary of a SubDevice in PREOP: compared with what is planned, and written where they differ
 //! (protocol 5.2, 6.3).
 //!
 //! A dictionary that is as at power-on is not read: what it holds is known from the scan.

@@ -33,20 +33,20 @@ pub struct Round {
 /// Whether a round is under way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Reads {
-    /// None is; the next one begins at this time at the earliest.
+    /// No round is under way; the next one begins at this time at the earliest.
     Resting(Instant),
-    /// One is.
+    /// A round is under way.
     UnderWay,
 }
 
 /// Requests for a round by other triggers than posted words, the most urgent one last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Request {
-    /// None: the next round is routine.
+    /// No request: the next round is routine.
     Nothing,
-    /// One at a time: it is not routine.
+    /// A round at a certain time: it is not routine.
     AtATime,
-    /// One now.
+    /// A round now.
     Now,
 }
 

@@ -39,7 +39,7 @@ fn sync_manager(number: usize, own: &SyncManagerLine) -> String {
     text + "        }}, ...\n"
 }
 
-/// Entries as ports: inputs of the SubDevice are inputs of its block. Gaps are none.
+/// Entries as ports: inputs of the SubDevice are inputs of its block. Gaps have no port.
 fn ports(details: &Description) -> String {
     let (mut text, mut inputs, mut outputs) = (String::new(), 0, 0);
     for (number, own) in details.sync_managers.iter().enumerate() {

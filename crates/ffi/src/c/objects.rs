@@ -115,7 +115,7 @@ impl Owner {
     /// The handle of a domain of a network file: always the same one.
     ///
     /// # Errors
-    /// There is none.
+    /// There is no such domain.
     pub fn domain(&self, id: DomainId) -> Outcome<*mut ec_domain_t> {
         let address = locked(&self.domains).get(id.0).copied().ok_or(Code::NOT_FOUND)?;
         Ok(address as *mut ec_domain_t)
@@ -136,7 +136,7 @@ impl Owner {
             };
             Ok((index, draft.info(index).is_some()))
         })?;
-        // It may have come since the last scan that the declaration knows. To ask for that takes long.
+        // It may have come since the last scan that the declaration contains. A question for it takes long.
         if !is_found {
             self.master.refresh()?;
         }

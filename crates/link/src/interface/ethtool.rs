@@ -145,7 +145,7 @@ fn link(words: &[u32; ETHTOOL_WORDS]) -> Link {
         1 => Some(true),
         _ => None,
     };
-    // Drivers say 0 or 65,535 too where there is no link.
+    // Drivers report 0 or 65,535 too where there is no link.
     Link { mbits: Some(mbits).filter(|mbits| ![0, 0xFFFF, UNKNOWN_SPEED].contains(mbits)), full_duplex }
 }
 

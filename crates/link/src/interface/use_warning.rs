@@ -108,11 +108,11 @@ pub fn exclusive_use(name: &str) -> Vec<UseWarning> {
 pub struct Uses {
     /// What was found.
     pub found: Vec<UseWarning>,
-    /// What the kernel did not tell: there may be more.
+    /// What the kernel did not report: there may be more.
     pub unknown: Vec<Unknown>,
 }
 
-/// A use of an interface that the kernel did not tell anything about.
+/// A use of an interface that the kernel did not report anything about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Unknown {

@@ -37,7 +37,7 @@ mod with {
             orders: &Arc<Orders>,
         ) -> Result<Ethernet, Error> {
             let handed = Arc::new(HandedInterfaces::new(descriptors, orders.clone()));
-            // A master with a larger number has none.
+            // A master with a larger number has no network interfaces.
             let options = EthernetOptions::new(u16::try_from(master).unwrap_or(u16::MAX), main.0);
             let found = handed.clone();
             let moved = supervisor.start_lasting_ethernet(options, move |name, mac| found.find(name, mac))?;

@@ -32,7 +32,8 @@ enum Ordered {
 }
 
 impl HandedInterfaces {
-    /// The interfaces that came with the bus. A descriptor that is none is left out: it is ordered when it is needed.
+    /// The interfaces that came with the bus. A descriptor of another kind is left out: the interface is ordered when
+    /// it is needed.
     pub fn new(descriptors: Vec<OwnedFd>, orders: Arc<Orders>) -> HandedInterfaces {
         let taps = descriptors.into_iter().filter_map(|fd| TapInterface::adopt(fd).ok());
         let there = taps.map(|tap| (tap.name().to_owned(), tap)).collect();

@@ -24,7 +24,7 @@ const STACK_BYTES: usize = 512 << 10;
 /// Interval of checks for new events of scans.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// The thread that receives what the daemon says.
+/// The thread that receives the messages of the daemon.
 pub(super) struct Receiver {
     pub supervisor: SupervisorThread,
     pub connection: Arc<Connection>,
@@ -90,7 +90,7 @@ impl Receiver {
                 self.ownership.taken_back(cause);
                 return false;
             }
-            // A daemon of this version says nothing else.
+            // A daemon of this version sends no other message.
             _ => {}
         }
         true

@@ -1,4 +1,4 @@
-//! Errors of services as refusals that tell a client what kind of failure it was.
+//! Errors of services as refusals that name the kind of failure.
 
 use ringcat_control::refusal::{Refusal, ServiceFault};
 use ringcat_engine::mail::MailboxError;

@@ -90,7 +90,7 @@ impl EsiFolder {
     /// Reads the whole description of a device.
     ///
     /// # Errors
-    /// The file is no longer what the index says.
+    /// The file is no longer as the index describes it.
     pub fn load(&self, described: &Described<'_>) -> Result<Esi, EsiFailure> {
         load(&self.path.join(&described.file.path))
     }
@@ -103,7 +103,7 @@ fn collect(folder: &Path, depth: usize, found: &mut Vec<(PathBuf, Stamp)>) -> io
         // A link to nothing is no file.
         let Ok(metadata) = fs::metadata(&path) else { continue };
         if metadata.is_dir() && depth > 0 {
-            // A folder that must not be read is none of ours.
+            // A folder that this user may not read is left out.
             let _ = collect(&path, depth - 1, found);
         } else if metadata.is_file()
             && path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml"))

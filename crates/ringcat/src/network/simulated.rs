@@ -17,7 +17,7 @@ use crate::eni::EniFile;
 pub enum SimulatedNetworkError {
     /// The file leaves to the EEPROM what a simulated SubDevice has to be made of.
     Incomplete(Box<ExportError>),
-    /// What the file says of its SubDevices contradicts itself.
+    /// The description of its SubDevices in the file contradicts itself.
     Contradiction(Box<EniError>),
     /// The cables do not fit.
     Segment(SegmentError),

@@ -6,7 +6,7 @@
 //!
 //! [`Guard::start`] starts the process; its program calls [`run`]. The guard sees the end of the process at once, and
 //! that it hangs, or is stopped by a signal, from a heartbeat in shared memory: [`Guard::beat`] in the loop of the
-//! program. Where the guard has acted, the next beat tells that, and nothing of the process leaves any more.
+//! program. Where the guard has acted, the next beat shows that, and nothing of the process leaves any more.
 
 mod silence;
 mod watch;
@@ -29,7 +29,7 @@ use ringcat_link::process::{Peer, watch_peer};
 pub use watch::Ending;
 use watch::{Order, RELEASED, UNTIMED};
 
-/// The process says within this time that it guards.
+/// The process reports within this time that it guards.
 const START: Duration = Duration::from_secs(5);
 /// The process ends within this time after it was released.
 const END: Duration = Duration::from_secs(1);
@@ -37,7 +37,7 @@ const END: Duration = Duration::from_secs(1);
 const END_LOOK: Duration = Duration::from_millis(1);
 /// A program beats so often in the limit of its guard.
 const BEATS_PER_LIMIT: u32 = 4;
-/// What the guard says: it guards, or what is wrong.
+/// The message of the guard: it guards, or what is wrong.
 const READY: u8 = b'1';
 const WRONG: u8 = b'!';
 /// Longest message about what is wrong.

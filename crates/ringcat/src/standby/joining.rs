@@ -55,7 +55,8 @@ impl Joining {
         Joining { takes_over: policy.takes_over, silent_since: now, limit: policy.listen + pause }
     }
 
-    /// What follows from what was heard. Without a link that is up nothing can be heard: then it listens on.
+    /// What follows from the frames that were received. Without a link that is up none can be received: then it listens
+    /// on.
     pub fn next<L: Links>(&mut self, main_device: &MainDevice<L>) -> Next {
         let has_link = Link::ALL.iter().any(|link| main_device.links.carrier(*link) != Some(false));
         self.decide(&main_device.heard(), has_link, main_device.now())
@@ -180,7 +181,7 @@ impl<L: Links> MainDevice<L> {
                 return Err(Box::new(Refused { error, main_device: self }));
             }
             match joining.next(&self) {
-                // What was heard is known, and too old to be followed.
+                // What the ACTIVE has sent is known, and too old to be followed.
                 Next::Listen if self.heard().is_known => self.attend(SLICE),
                 Next::Listen => {}
                 Next::Follow => break self.follow(declare)?,

@@ -1,11 +1,11 @@
-//! What a configuration file says, as data: settings, what was understood, and mistakes.
+//! The contents of a configuration file as data: settings, what was understood, and mistakes.
 
 use std::fmt;
 use std::path::PathBuf;
 
 use crate::source::{MasterOption, SafeState};
 
-/// What a configuration file says.
+/// The contents of a configuration file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Conf {
     /// Masters in the order of their numbers.

@@ -1,4 +1,4 @@
-//! What a program shows of itself, and what it is asked for.
+//! What a program shows of itself, and the requests to it.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};

@@ -14,7 +14,7 @@ use super::board::{Board, Phase};
 
 /// Cycle time of both MainDevices.
 pub const CYCLE: Duration = Duration::from_millis(1);
-/// An INACTIVE looks this often whether it is asked for anything, while no frames come.
+/// An INACTIVE checks for requests at this interval while no frames come.
 const LOOK: Duration = Duration::from_millis(1);
 /// Limit of an orderly stop.
 const STOP_LIMIT: Duration = Duration::from_secs(2);

@@ -14,7 +14,7 @@ use crate::{RING_OF_10, said, states};
 const CYCLE_MS: f64 = 5.0;
 /// A busy machine reaches each state within this time.
 const LIMIT: Duration = Duration::from_secs(20);
-/// Options of both controllers. The machine may be busy: a stall of less than 40 ms is no death.
+/// Options of both controllers. The machine may be busy: a stall of less than 40 ms is no failure.
 const ROLE: [&str; 6] = ["--listen", "300ms", "--timeout", "10", "--guard", "40ms"];
 const AUTOMATIC: [&str; 3] = ["--automatic", "--cycle", "5ms"];
 const TAKEN_OVER: &str = "taken over: 10 SubDevices go on as they are";

@@ -21,7 +21,7 @@ const KEPT: [std::ops::Range<u16>; 6] =
 /// is requested again.
 const REPEAT_REQUEST: u16 = 0x080E;
 
-/// The first MainDevice dies, and the second one takes over three cycles later.
+/// The first MainDevice fails, and the second one takes over three cycles later.
 fn taken_over(count: usize) -> Two {
     let mut two = Two::in_op(ring_of_two(count, Host::First), declare, standby());
     two.run(Duration::from_millis(500));
@@ -140,7 +140,7 @@ fn a_subdevice_gone_before_a_takeover_is_missing_one_that_goes_with_it_is_lost()
     for before in [true, false] {
         let mut two = Two::in_op(ring_of_two(8, Host::First), declare, standby());
         two.run(Duration::from_millis(200));
-        // The SubDevice next to the MainDevice that dies: all others stay in reach.
+        // The SubDevice next to the MainDevice that fails: all others stay in reach.
         if before {
             two.fault(Fault::PowerOff(DeviceIndex(0)));
             two.run(Duration::from_millis(200));

@@ -15,8 +15,8 @@ use super::ring_of_two;
 /// Moments of a cycle, in microseconds.
 const PHASES: [u32; 5] = [0, 12, 60, 300, 900];
 
-/// Longest time without outputs when the ACTIVE dies: the time-out counts from its last process data, and the other one
-/// takes over with one of its cycles after that. In cycles, one less are missing.
+/// Longest time without outputs when the ACTIVE fails: the time-out counts from its last process data, and the other
+/// one takes over with one of its cycles after that. In cycles, one less are missing.
 const LONGEST_GAP: Duration = CYCLE.saturating_mul(TIME_OUT_CYCLES + 1);
 /// The same where process data takes several frames: a cycle of which only the first has come counts as heard.
 const LONGEST_GAP_OF_SEVERAL: Duration = LONGEST_GAP.saturating_add(CYCLE);
@@ -40,7 +40,7 @@ fn the_second_maindevice_joins_follows_and_sends_nothing() {
     }
 }
 
-/// How the ACTIVE dies.
+/// How the ACTIVE fails.
 #[derive(Clone, Copy, Debug)]
 enum Death {
     /// Its computer loses its power: both links go down at once.
@@ -51,7 +51,7 @@ enum Death {
     Hangs,
 }
 
-/// The ACTIVE dies at a moment of a cycle. Longest time between outputs in a SubDevice.
+/// The ACTIVE fails at a moment of a cycle. Longest time between outputs in a SubDevice.
 fn gap_after(pair: &mut Pair, death: Death, phase: u32) -> Duration {
     let (active, moment) = (Host::First, Duration::from_micros(phase.into()));
     pair.take_longest_gap();

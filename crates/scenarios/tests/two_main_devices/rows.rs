@@ -71,7 +71,8 @@ fn a_role_is_handed_over_with_any_cable_cut() {
 // covers: 9.7.5, MR-24, standby
 #[test]
 fn a_dead_active_and_a_cut_cable_leave_the_subdevices_that_are_in_reach() {
-    // The line begins at the first MainDevice. Without the one that dies the other one reaches a line from its own end.
+    // The line begins at the first MainDevice. Without the one that fails the other one reaches a line from its own
+    // end.
     for active in [0, 1] {
         for cable in 0..COUNT + 2 {
             let mut two = with_active(active);

@@ -1,4 +1,4 @@
-//! The ACTIVE dies, or hands its role over.
+//! The ACTIVE fails, or hands its role over.
 
 use std::time::Duration;
 

@@ -149,7 +149,7 @@ fn two_with_cycles_in_threads_join_hand_over_and_take_over() {
         handed.iter().any(is_handed)
     });
 
-    // It dies: its threads end, its links go down.
+    // It fails: its threads end, its links go down.
     let is_ready = |event: &StandbyEvent| matches!(event, StandbyEvent::Partner(partner) if partner.is_ready());
     until(&plant, &mut last, "the first one is ready again", || {
         handed.extend(standby_events(&second));

@@ -118,8 +118,8 @@ fn happen(world: &mut World, beside: &mut MailboxUsers, dice: &mut Dice, emergen
 }
 
 /// Requests a state of a device, and waits for it while its users go on. A request that meets a device without power
-/// fails, and the device reaches the state after its return. One that meets an injected abort, which the assignment of
-/// PDOs may, fails and leaves the device where it was: it is made again.
+/// fails, and the device reaches the state after its return. One that gets an injected abort, as the assignment of PDOs
+/// may, fails and leaves the device where it was: it is made again.
 fn change_state(world: &mut World, beside: &mut MailboxUsers, device: usize, state: AlState) {
     let mut request = world.application_mut().engine_mut().start_state_request(SubDeviceId(device), state);
     let until = world.application().now() + END;

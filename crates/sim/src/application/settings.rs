@@ -180,7 +180,8 @@ fn expected_length(description: &DeviceDescription, dictionary: &Dictionary, num
     u32::from(description.default_length(number))
 }
 
-/// Whether the list of modules that was written is that of the detected ones; a list without idents is none (ES-69).
+/// Whether the list of modules that was written is that of the detected ones; a list without idents does not count
+/// (ES-69).
 fn modules_match(dictionary: &Dictionary) -> bool {
     const CONFIGURED: u16 = 0xF030;
     const DETECTED: u16 = 0xF050;

@@ -20,7 +20,7 @@ pub struct Made {
     pub text: String,
 }
 
-/// The public items in the body of a macro; `is_private` tells traits without a meaning for other crates.
+/// The public items in the body of a macro; `is_private` finds traits without a meaning for other crates.
 pub fn made(definition: &TokenStream, is_private: &dyn Fn(&str) -> bool) -> Vec<Made> {
     let mut body = Body { is_private, found: Vec::new() };
     let mut is_body = false;

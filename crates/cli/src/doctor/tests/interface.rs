@@ -1,4 +1,4 @@
-//! What the kernel and the driver tell of an interface.
+//! What the kernel and the driver report of an interface.
 
 use ringcat_link::interface::ethtool::{Coalescing, Driver, Eee, Link, NoAnswer, Offloads};
 use ringcat_link::interface::{Unknown, UseWarning};

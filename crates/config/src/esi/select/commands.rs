@@ -152,7 +152,7 @@ fn limits(part: &crate::esi::values::Part, data: &[u8]) -> Result<(), String> {
     let value = number(data);
     let least = part.minimum.as_deref().map(number);
     let most = part.maximum.as_deref().map(number);
-    // Some files have limits of 0 and 0 where there are none.
+    // Some files state the limits 0 and 0 for an object without limits.
     if least.zip(most).is_some_and(|(least, most)| least >= most) {
         return Ok(());
     }

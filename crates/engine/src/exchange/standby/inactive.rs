@@ -129,7 +129,7 @@ impl State {
         }
     }
 
-    /// Posts what the last whole cycle says of SubDevices, ring and links.
+    /// Posts what the last whole cycle contains about SubDevices, ring and links.
     fn post_whole(&self, board: &Board) {
         let Some(whole) = self.following.whole() else { return };
         for (subdevice, byte) in whole.content.subdevices.iter().enumerate() {

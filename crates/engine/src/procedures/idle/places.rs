@@ -49,7 +49,7 @@ pub(super) async fn wrong_addresses(
 /// open in the last scan.
 async fn ports_as_before(bus: &Bus, now: &View, before: &Found) -> Vec<bool> {
     let read = bus.gather(now.stations.clone(), |bus, station| async move {
-        // Where several SubDevices have the address, the answer is none.
+        // Where several SubDevices have the address, the answer does not count.
         Some(DlStatus::decode(&bus.fprd_array(station, map::DL_STATUS).await.ok()?))
     });
     let open = |status: DlStatus| status.ports.map(|port| port.communication);

@@ -45,7 +45,7 @@ impl PowerOns {
     }
 }
 
-/// Whether the addresses of all SubDevices are 0, which one datagram says: most scans follow power-on.
+/// Whether the addresses of all SubDevices are 0, which one datagram shows: most scans follow power-on.
 async fn all_are_fresh(bus: &Bus, count: u16) -> bool {
     let ored = bus.brd(map::STATION_ADDRESS, 2).await;
     ored.is_ok_and(|ored| ored.wkc() == Wkc(count) && ored.data.iter().all(|byte| *byte == 0))

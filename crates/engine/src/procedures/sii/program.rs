@@ -209,8 +209,8 @@ pub async fn read_all(bus: &Bus, station: StationAddress) -> Result<Vec<u8>, Sii
     bytes
 }
 
-/// Writes an image; see [`check`]. One that is longer than the EEPROM says it is needs `force`: what fits would be
-/// written, and the rest fail.
+/// Writes an image; see [`check`]. One that is longer than the EEPROM states as its size needs `force`: what fits would
+/// be written, and the rest would fail.
 pub async fn write(
     bus: &Bus,
     station: StationAddress,
@@ -303,7 +303,7 @@ impl<'a> Access<'a> {
         Ok(eeprom.bytes(first, count, None).await?)
     }
 
-    /// Words of the EEPROM, as its present content says.
+    /// Words of the EEPROM, as its present content states.
     async fn size(&self) -> Result<u32, SiiProgramError> {
         let size = self.read(SIZE_WORD, 1).await?;
         Ok((u32::from(u16::from_le_bytes([size[0], size[1]])) + 1) * KIBIT)

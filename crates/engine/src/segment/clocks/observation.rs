@@ -48,7 +48,7 @@ pub enum ClockObservation<'a> {
         /// They are being started.
         are_starting: bool,
     },
-    /// The exchange has taken over a shift: it says how far all offsets are set back.
+    /// The exchange has taken over a shift: it reports how far all offsets are set back.
     SlideBegun,
     /// All offsets are about to be set back by this number of nanoseconds.
     SteppingBack(u64),

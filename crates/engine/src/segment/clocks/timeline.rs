@@ -30,7 +30,7 @@ pub struct Times {
     far: Vec<i64>,
     /// Nanoseconds by which the system time is still to go back in steps.
     left_ns: u64,
-    /// The number of the last wanted time before; `None` once the exchange has said by how much it goes back.
+    /// The number of the last wanted time before; `None` once the exchange has reported by how much it goes back.
     unsaid: Option<u32>,
     /// Nanoseconds by which it has gone back in steps.
     slid: u64,

@@ -17,7 +17,7 @@ pub(super) fn expected(expected: &str) -> Refusal {
 /// The number of a drive behind a SubDevice.
 ///
 /// # Errors
-/// There is none with this number.
+/// There is no drive with this number.
 pub(super) fn drive(number: u8) -> Result<u8, Refusal> {
     if number <= MAX_DRIVE {
         Ok(number)

@@ -91,7 +91,7 @@ mod tests {
             assert_eq!(put(number, 0, b"x", 2), Ok(()));
         }
         assert!(put(5, 0, b"x", 2).is_err_and(|text| text.contains("4 files")));
-        // Nothing was said of the first one for a minute.
+        // No part of the first one came for a minute.
         assert_eq!(put(5, 0, b"x", 61), Ok(()));
         assert_eq!(all.iter().map(|it| it.number).collect::<Vec<_>>(), [2, 3, 4, 5]);
     }

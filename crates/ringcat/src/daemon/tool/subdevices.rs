@@ -33,7 +33,7 @@ pub(super) fn list(supervisor: &SupervisorThread, from: u16) -> Result<Piece<Sub
     }
     let read = |command, target| RawDatagram::new(command, target, vec![0; 2]).with_resend(true);
     let states = stations.iter().map(|station| read(Command::Fprd, Target::Station(*station, map::AL_STATUS)));
-    // The broadcast tells how many answer on each link.
+    // The broadcast shows how many answer on each link.
     let all = states.chain([read(Command::Brd, Target::Broadcast(map::AL_STATUS))]).collect();
     let mut replies = supervisor.datagrams(all)?;
     let on_main = match replies.pop() {

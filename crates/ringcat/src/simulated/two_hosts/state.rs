@@ -1,4 +1,4 @@
-//! Whose turn it is: the caller, or the program of one of two hosts.
+//! Which one runs now: the caller, or the program of one of two hosts.
 //!
 //! In: until when each of them waits. Out: which of them is next; virtual time has then reached its moment. Of several
 //! with one moment the caller is first, then the first host.
@@ -37,7 +37,7 @@ impl Turn {
 /// What the program of a host does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Program {
-    /// There is none.
+    /// The host has no program.
     None,
     /// It has the turn, or will have it.
     Runs,

@@ -1,9 +1,9 @@
-//! How long a heartbeat is silent.
+//! For how long a heartbeat has been missing.
 
 use std::time::{Duration, Instant};
 
-/// The silence of a heartbeat after its first beat, by looks at it. A look that comes late counts for two intervals at
-/// most: what has delayed it, such as a machine that stalls, has delayed the other process too.
+/// The silence of a heartbeat after its first beat, by checks of it. A check that comes late counts for two intervals
+/// at most: what has delayed it, such as a machine that stalls, has delayed the other process too.
 #[derive(Debug)]
 pub(super) struct Silence {
     beats: u32,
@@ -13,7 +13,7 @@ pub(super) struct Silence {
 }
 
 impl Silence {
-    /// None yet, with looks at this interval.
+    /// No beat yet, with checks at this interval.
     pub(super) fn new(now: Instant, interval: Duration) -> Silence {
         Silence { beats: 0, looked_at: now, interval, lasts: Duration::ZERO }
     }

@@ -11,9 +11,9 @@ use ringcat_link::process::wait_readable;
 
 use super::silence::Silence;
 
-/// What a program says: its guard is to end.
+/// Message of a program: its guard is to end.
 pub(super) const RELEASED: u8 = b'0';
-/// What a program says: from now on only its end counts, not its silence.
+/// Message of a program: from now on only its end counts, not its silence.
 pub(super) const UNTIMED: u8 = b'-';
 /// Looks at the heartbeat within the limit.
 const LOOKS_PER_LIMIT: u32 = 8;
@@ -54,7 +54,7 @@ impl Order {
     /// Takes the order with the heartbeat.
     ///
     /// # Errors
-    /// There is none.
+    /// No valid order has arrived.
     pub(super) fn receive(stream: &UnixStream) -> io::Result<Order> {
         let wrong = || io::Error::new(ErrorKind::InvalidData, "expected an order of the program that is to be guarded");
         let mut bytes = [0; LONGEST_ORDER];
@@ -80,7 +80,7 @@ impl Order {
         loop {
             let ready = wait_readable(&both, interval);
             if ready != 0 {
-                // What the process said before its end counts.
+                // A message of the process before its end counts.
                 match read(stream) {
                     Said::Released => return Ending::Released,
                     Said::Ended => return Ending::Died,
@@ -96,7 +96,7 @@ impl Order {
     }
 }
 
-/// What a process has said.
+/// The message of a process.
 enum Said {
     Nothing,
     Released,
@@ -110,7 +110,7 @@ fn read(mut stream: &UnixStream) -> Said {
         Ok(1) if byte == [RELEASED] => Said::Released,
         Ok(1) if byte == [UNTIMED] => Said::Untimed,
         Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Said::Nothing,
-        // The end of the stream, or what no program says that uses this library.
+        // The end of the stream, or what no program sends that uses this library.
         _ => Said::Ended,
     }
 }
@@ -213,7 +213,7 @@ mod tests {
             let (near, far) = UnixStream::pair().expect("a pair");
             let heartbeat = Heartbeat::new().expect("there is memory");
             let memory = [heartbeat.as_fd().as_raw_fd()];
-            // An empty message is none: the stream ends.
+            // An empty message is no message: the stream ends.
             let _ = descriptors::send(&near, words.as_bytes(), if has_memory { &memory } else { &[] });
             drop(near);
             assert!(Order::receive(&far).is_err(), "{words:?}");

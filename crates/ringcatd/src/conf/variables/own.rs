@@ -11,7 +11,7 @@ use crate::source::SafeState;
 const MOST_DEBUG: u32 = 2;
 
 impl Reading {
-    /// Evaluates a variable by its name behind `RINGCAT_`. Returns its meaning. An empty value is none.
+    /// Evaluates a variable by its name behind `RINGCAT_`. Returns its meaning. An empty value counts as not set.
     pub(super) fn own(&mut self, line: usize, name: &str, value: &str) -> Result<String, String> {
         if let Some(rest) = name.strip_prefix("MASTER") {
             return self.of_master(line, rest, value);

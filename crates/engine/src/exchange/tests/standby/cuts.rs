@@ -25,7 +25,7 @@ fn pass(second: &mut Device, duo_now: crate::time::Instant, frame: &mut [u8], wa
 #[test]
 fn in_each_row_of_a_cut_one_copy_counts_as_expected_and_none_more() {
     use Link::{Main, Redundant};
-    // Ways of the main and of the redundant copy; `None` where a link is dead.
+    // Paths of the main and of the redundant copy; `None` where a link is down.
     let rows: [(&str, Option<Way>, Option<Way>); 9] = [
         ("no cut", Some((Redundant, &[Redundant])), Some((Main, &[Main]))),
         ("near: first cable", None, Some((Redundant, &[Main, Redundant]))),

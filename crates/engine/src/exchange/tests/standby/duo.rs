@@ -98,7 +98,7 @@ impl Device {
 pub enum End {
     /// The other MainDevice, which forwards.
     Forwards,
-    /// Nothing: ports are closed, and the other MainDevice is dead.
+    /// Nothing: ports are closed, and the other MainDevice has failed.
     Closed,
 }
 

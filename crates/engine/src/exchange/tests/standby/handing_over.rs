@@ -63,7 +63,7 @@ fn a_role_that_the_other_one_does_not_take_is_kept_and_that_is_reported() {
     duo.second.control.set_not_ready(NotReady::HELD.0, false);
     count(&mut duo, 70, 3);
     duo.first.control.request(RoleRequest::HandOver);
-    // It dies in the moment in which it would accept.
+    // It fails at the moment at which it would accept.
     duo.end = End::Closed;
     count(&mut duo, 80, 80);
     assert!(duo.first.is_active() && duo.first.standby_events().iter().any(refused));

@@ -61,7 +61,7 @@ fn the_first_cycle_of_a_takeover_has_the_latest_outputs_and_merged_inputs() {
         duo.base = 0x40 + 8 * number;
         duo.cycle();
     }
-    // The ACTIVE dies.
+    // The ACTIVE fails.
     duo.first.control.request(RoleRequest::Inactive);
     duo.first.exchange.begin_role(duo.now);
     duo.second.control.request(RoleRequest::Active);
@@ -88,7 +88,7 @@ fn outputs_of_a_cycle_that_was_cut_off_never_go_back_to_those_before() {
     let mut duo = duo();
     duo.first.exchange.image_mut(DOMAIN)[..3].fill(1);
     (0..3).for_each(|_| duo.cycle());
-    // The ACTIVE dies after its frame with process data: no master frame of this cycle arrives.
+    // The ACTIVE fails after its frame with process data: no master frame of this cycle arrives.
     duo.first.exchange.image_mut(DOMAIN)[..3].fill(2);
     duo.drop_frame(ringcat_wire::master_frame::is_master_frame);
     duo.cycle();
