@@ -18,7 +18,7 @@ use crate::wire::{Limits, WireError};
 const GREETING: Duration = Duration::from_secs(5);
 /// Wait for an answer beyond the time that the query may take.
 const BEYOND: Duration = Duration::from_secs(30);
-/// A query waits so long while the master passes from one process to another.
+/// Longest wait of a query while the master passes from one process to another.
 const CHANGE: Duration = Duration::from_secs(5);
 /// Interval of tries meanwhile.
 const PAUSE: Duration = Duration::from_millis(5);
@@ -197,7 +197,7 @@ mod tests {
 
     use super::*;
 
-    /// A daemon that refuses so many questions before it answers one; the number of questions that it got.
+    /// A daemon that refuses this many questions before it answers one; the number of questions that it got.
     fn refusing(refusals: Vec<Refusal>) -> (PathBuf, std::thread::JoinHandle<usize>) {
         static NUMBER: std::sync::atomic::AtomicU32 = std::sync::atomic::AtomicU32::new(0);
         let number = NUMBER.fetch_add(1, std::sync::atomic::Ordering::Relaxed);

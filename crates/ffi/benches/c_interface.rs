@@ -3,8 +3,9 @@
 //! * Instructions in user mode of receive, process, queue and send, with one SubDevice: both programs get their bus
 //!   from the same daemon, callgrind counts in the thread of the cycles only.
 //! * From the request of a master to OP of 50 SubDevices, in turn with both.
-//! * The cycles of an application at 1 kHz without and with 50 clients that ask 100 times in a second each. `cargo
-//! bench -p ringcat-ffi`. Without a C compiler or valgrind the parts that need them report that.
+//! * The cycles of an application at 1 kHz without and with 50 clients that ask 100 times in a second each.
+//!
+//! `cargo bench -p ringcat-ffi`. Without a C compiler or valgrind the parts that need them report that.
 
 #[path = "c_interface/callgrind.rs"]
 mod callgrind;

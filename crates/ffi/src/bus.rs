@@ -25,7 +25,7 @@ const READY_LIMIT: Duration = Duration::from_secs(20);
 const SILENCE: Duration = Duration::from_millis(300);
 /// Interval of checks at the progress.
 const PAUSE: Duration = Duration::from_micros(500);
-/// A request waits so long while the master passes from one process to another.
+/// Longest wait of a request while the master passes from one process to another.
 const CHANGE: Duration = Duration::from_secs(5);
 static BUSES: Mutex<Vec<Weak<Bus>>> = Mutex::new(Vec::new());
 

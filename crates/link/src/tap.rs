@@ -129,8 +129,8 @@ impl TapInterface {
         Ok(tap)
     }
 
-    /// The same for an interface that outlasts this process: one with this name that no process has open is gone on
-    /// with as it is. It is removed by [`TapInterface::end_with_processes`], or by `ip link del`.
+    /// The same for an interface that outlasts this process: an existing one with this name that no process has open is
+    /// used as it is. It is removed by [`TapInterface::end_with_processes`], or by `ip link del`.
     ///
     /// # Errors
     /// As [`TapInterface::create`]; another process has it open.

@@ -9,7 +9,7 @@ use crate::driving::Driving;
 use crate::opened::Opened;
 use crate::owner::OwnerLink;
 
-/// An application that asks for a master waits so long while it passes from another process to the daemon. That takes
+/// Longest wait of an application that asks for a master while it passes from another process to the daemon. That takes
 /// milliseconds, and longer on a busy machine.
 pub const CHANGE: Duration = Duration::from_secs(5);
 
@@ -105,7 +105,7 @@ mod tests {
     use crate::segment_process;
     use crate::wires::Wires;
 
-    /// A wait has this limit: nothing in these tests takes so long.
+    /// A wait has this limit: nothing in these tests takes that long.
     const LONG: Duration = Duration::from_secs(30);
     /// A wait that is given up in a test.
     const SHORT: Duration = Duration::from_millis(20);

@@ -15,11 +15,11 @@ use crate::ethernet::EthernetInterfaces;
 use crate::log::{print, say};
 use crate::opened::Opened;
 
-/// A hand-over waits so long for the end of a scan.
+/// Longest wait of a hand-over for the end of a scan.
 const SCAN: Duration = Duration::from_secs(20);
-/// A hand-over waits so long for a scan that has not begun.
+/// Longest wait of a hand-over for a scan that has not begun.
 const FIRST_SCAN: Duration = Duration::from_millis(200);
-/// A hand-over waits so long for SubDevices that change their states.
+/// Longest wait of a hand-over for SubDevices that change their states.
 const SETTLE: Duration = Duration::from_secs(3);
 /// States that do not change for this time stay as they are.
 const STILL: Duration = Duration::from_millis(100);

@@ -16,7 +16,7 @@ use ringcat_link::operator::{OperatorLines, Priority, lost_lines};
 const NAME: &str = "ringcatd";
 /// Lines that wait to be written.
 const MOST_WAITING: usize = 256;
-/// The end of the program waits so long for its last lines.
+/// Longest wait of the end of the program for its last lines.
 const LAST: Duration = Duration::from_secs(1);
 
 static LOG: Log = Log::new();

@@ -58,7 +58,7 @@ impl Opener {
         Ok(Opener::Process(Mutex::new(near), child))
     }
 
-    /// A set of sockets for so many links, in the order of
+    /// A set of sockets for this number of links, in the order of
     /// [`HandedLinks`](ringcat_control::message::HandedLinks). The kernel takes 10 to 20 ms for each.
     ///
     /// # Errors
@@ -94,7 +94,7 @@ fn ask(socket: &UnixStream, links: usize) -> Result<Vec<OwnedFd>, String> {
     }
 }
 
-/// A set of sockets for so many links.
+/// A set of sockets for this number of links.
 fn make(links: usize) -> Result<Vec<OwnedFd>, LinkError> {
     let both = [ClassFilter::Cyclic, ClassFilter::Acyclic];
     let each = both.into_iter().flat_map(|filter| std::iter::repeat_n(filter, links));

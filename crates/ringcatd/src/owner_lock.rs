@@ -73,7 +73,7 @@ impl OwnerLock {
         self.file.as_raw_fd()
     }
 
-    /// Without the text the lock is held all the same: it only names the process.
+    /// The lock is held without the text too: the text only names the process.
     fn write(&mut self, text: &str) {
         let _ = self.file.set_len(0);
         let _ = self.file.seek(SeekFrom::Start(0)).and_then(|_| self.file.write_all(text.as_bytes()));

@@ -26,7 +26,7 @@ pub struct Two {
     pub network: Network,
     /// The MainDevices.
     pub controllers: [Controller; 2],
-    /// AL status of each device at the last look.
+    /// AL status of each device at the last check.
     status: Vec<AlStatus>,
     /// Devices that left OP, and when.
     pub left_op: Vec<(SimTime, usize)>,
@@ -142,7 +142,7 @@ impl Two {
         self.look();
     }
 
-    /// Looks at the devices.
+    /// Checks the devices.
     fn look(&mut self) {
         let now = self.network.now();
         let op = AlStatus::new(AlState::Op);

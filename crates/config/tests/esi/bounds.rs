@@ -118,7 +118,7 @@ fn two_ways_to_one_file_of_modules_are_no_circle() {
     let esi = read(&file(&["b.xml", "c.xml", "b.xml"], ""), &files).unwrap();
     assert_eq!((esi.modules.len(), esi.notices.len()), (1, 0));
     assert_eq!(files.1.take(), ["b.xml", "d.xml", "c.xml"]);
-    // A circle behind two ways is one.
+    // A circle that two references lead to is a circle.
     let files = counted([("b.xml", file(&["c.xml"], "")), ("c.xml", file(&["b.xml"], ""))]);
     let error = read(&file(&["c.xml", "b.xml"], ""), &files).unwrap_err();
     let expected = "acme.xml:2: a file that it refers to: b.xml:2: InfoReference \"c.xml\": the file refers to itself";

@@ -158,7 +158,7 @@ impl Flight {
         self.repeatable && !self.answered && !self.released && self.no_return == 0
     }
 
-    /// Whether copies of frames that were sent more than `margin` nanoseconds later have come back on the way of each
+    /// Whether copies of frames that were sent more than `margin` nanoseconds later have come back on the path of each
     /// missing copy, which frames do not overtake each other on: it does not come back any more. `newest`: when the
     /// newest of these was sent, by link.
     pub fn is_overtaken(&self, newest: [Instant; 2], margin: u64, links: LinkSet) -> bool {

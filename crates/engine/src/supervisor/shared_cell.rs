@@ -1,6 +1,7 @@
-//! The common state behind one access, which notes when the state may have changed. An application with one thread
-//! checks in each pass of its waits whether the acyclic half has work. The answer changes only with the state, which
-//! changes only through [`SharedCell::borrow_mut`], and with words that others post.
+//! The common state behind one access, which notes when the state may have changed.
+//!
+//! An application with one thread checks in each pass of its waits whether the acyclic half has work. The answer
+//! changes only with the state, which changes only through [`SharedCell::borrow_mut`], and with words that others post.
 
 use core::cell::{Cell, Ref, RefCell, RefMut};
 

@@ -172,7 +172,7 @@ fn refuse(bench: &Bench) {
             is_refusing
         })
     };
-    // The acknowledgement may be faster than this look.
+    // The acknowledgement may be faster than this check.
     bench.wait_until("refused", || {
         bench.good(&["states", "-p3", "INIT"]);
         bench.good(&["states", "-p3", "PREOP"]);

@@ -57,7 +57,7 @@ pub fn cost(program: &Path, words: &[&str], bench: &Bench) -> Cost {
     Cost { short, long }
 }
 
-/// A run of so many cycles; `meanwhile` begins when the SubDevices are in OP.
+/// A run of this number of cycles; `meanwhile` begins when the SubDevices are in OP.
 fn run(program: &Path, words: &[&str], bench: &Bench, count: u64, meanwhile: impl FnOnce()) -> Run {
     let directory = crate::library::workshop().join(format!("callgrind-{}-{count}", words.join("-")));
     let _ = std::fs::remove_dir_all(&directory);

@@ -34,7 +34,7 @@ fn text(count: usize, kind: &str) -> String {
     text
 }
 
-/// A segment file with so many SubDevices of a kind.
+/// A segment file with this number of SubDevices of a kind.
 pub fn file(count: usize, kind: &str) -> PathBuf {
     let path = crate::library::workshop().join(format!("{count}-{kind}.toml"));
     std::fs::write(&path, text(count, kind)).expect("it can be written");
@@ -42,7 +42,7 @@ pub fn file(count: usize, kind: &str) -> PathBuf {
 }
 
 impl Bench {
-    /// A daemon on a line of so many SubDevices of a kind, scanned.
+    /// A daemon on a line of this number of SubDevices of a kind, scanned.
     pub fn start(count: usize, kind: &str) -> Bench {
         let (near, far) = UnixStream::pair().expect("a pair");
         let ends = Arc::new(AtomicBool::new(false));

@@ -127,7 +127,7 @@ fn run(followed: &Followed, ends: &Receiver<()>, mut print: impl FnMut(Priority,
     }
 }
 
-/// Takes the messages since the last look, as far as there are not too many.
+/// Takes the messages since the last check, as far as there are not too many.
 fn take_messages(supervisor: &SupervisorThread, lines: &mut Lines, next: &mut u64) {
     let Ok(since) = supervisor.messages_since(*next) else { return };
     *next = since.next;

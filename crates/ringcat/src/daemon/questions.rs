@@ -46,7 +46,7 @@ impl Questions {
         Ok(Questions { slow: start(SLOW)?, quick: start(QUICK)?, connection: connection.clone() })
     }
 
-    /// A queue with so many threads.
+    /// A queue with this number of threads.
     fn queue(
         threads: usize,
         supervisor: &SupervisorThread,

@@ -1,4 +1,4 @@
-//! Answers to the questions of the command line tool, one file per matter.
+//! Answers to the questions of the command line tool, one file per subject.
 //!
 //! Every number in a question is checked here or by the service that it is for. Waits until the answer is there.
 

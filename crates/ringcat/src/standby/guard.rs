@@ -35,7 +35,7 @@ const START: Duration = Duration::from_secs(5);
 const END: Duration = Duration::from_secs(1);
 /// Interval of checks whether it has ended.
 const END_LOOK: Duration = Duration::from_millis(1);
-/// A program beats so often in the limit of its guard.
+/// Beats of a program within the limit of its guard.
 const BEATS_PER_LIMIT: u32 = 4;
 /// The message of the guard: it guards, or what is wrong.
 const READY: u8 = b'1';

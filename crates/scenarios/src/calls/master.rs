@@ -66,7 +66,7 @@ pub struct Ecrt {
     /// The application's time when the host's is zero.
     pub clock_base: u64,
     log: VecDeque<String>,
-    /// Events since it was emptied last, for scenarios that look at them.
+    /// Events since it was emptied last, for scenarios that check them.
     pub events: Option<Vec<Event>>,
 }
 

@@ -14,7 +14,7 @@ use super::programs::{CYCLE, outputs_of};
 
 /// Cycles without the ACTIVE after which the other one takes over.
 pub const TIME_OUT_CYCLES: u32 = 3;
-/// How long it listens before it looks again what follows.
+/// How long it listens before it decides again what follows.
 const SLICE: Duration = Duration::from_millis(1);
 /// How long it listens at its start.
 const LISTEN: Duration = Duration::from_millis(30);

@@ -174,7 +174,7 @@ mod tests {
         check([way(), vec![frame(6_000, HostLink::Main, false, 0x06)]].concat());
     }
 
-    /// Both hosts send in each of so many cycles.
+    /// Both hosts send in each of this number of cycles.
     fn both_send(cycles: u64) {
         let mut traffic = Traffic::new(CYCLE);
         for cycle in 0..cycles {

@@ -15,7 +15,7 @@ use scenarios::world::World;
 
 const MS: Duration = Duration::from_millis(1);
 const CYCLE_NS: u32 = 1_000_000;
-/// Cycles until the ways of frames are known, and clocks run.
+/// Cycles until the paths of frames are known, and clocks run.
 const LEARNING: u64 = 200;
 /// Cycles in which a fault has its effects.
 const EFFECTS: u64 = 12;

@@ -1,4 +1,4 @@
-//! The difference between two references while both show the same time, because their ways from the host have
+//! The difference between two references while both show the same time, because their paths from the host have
 //! different lengths: a mean over as many cycles as the jitter of the host requires.
 //!
 //! Input: the differences that frames read, which contain the sending jitter of the host and now and then a stall of

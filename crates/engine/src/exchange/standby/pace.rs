@@ -1,8 +1,8 @@
 //! When cycles of an INACTIVE begin: in step with those of the ACTIVE (protocol FR-09).
 //!
-//! A cycle begins when the last master frame has come on both links. It does not wait for ever: a link without a
-//! carrier is left out, and half a period after the first master frame the cycle begins with what is there. Without an
-//! ACTIVE cycles go on, half a period after the time at which its next one was expected.
+//! A cycle begins when the last master frame has come on both links. Its wait is bounded: a link without a carrier is
+//! left out, and half a period after the first master frame the cycle begins with what is there. Without an ACTIVE
+//! cycles go on, half a period after the time at which its next one was expected.
 
 use super::Exchange;
 use super::state::State;

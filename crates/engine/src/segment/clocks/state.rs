@@ -204,7 +204,7 @@ impl Clocks {
         self.are_set_up() && self.times.left_ns() > 0
     }
 
-    /// The next of these steps, so long after the last one; 0 while the paths of frames are doubtful.
+    /// The next of these steps, this long after the last one; 0 while the paths of frames are doubtful.
     pub fn next_step_ns(&self, passed_ns: u64) -> u64 {
         let is_calm = self.running().is_some_and(|running| {
             running.delays == Delays::Valid && running.unwritten == Unwritten::default() && running.due == Due::Nothing
@@ -317,7 +317,7 @@ impl Clocks {
         References { main: station(Link::Main), redundant: station(Link::Redundant), redundant_leads }
     }
 
-    /// Whether a member without a locked clock goes on all the same. One with an unknown delay never does: its time may
+    /// Whether a member without a locked clock goes on nevertheless. One with an unknown delay never does: its time may
     /// be wrong by any amount.
     pub fn goes_on_unlocked(&self, is_hidden: bool) -> bool {
         self.config.when_unlocked == WhenUnlocked::GoOn && !is_hidden

@@ -141,7 +141,7 @@ impl Times {
         }
     }
 
-    /// The next step back, in nanoseconds, so long after the last one.
+    /// The next step back, in nanoseconds, this long after the last one.
     pub fn step_ns(&self, passed_ns: u64) -> u64 {
         if self.is_sliding() { (passed_ns / SLOWNESS).min(LARGEST_STEP_NS).min(self.left_ns) } else { 0 }
     }

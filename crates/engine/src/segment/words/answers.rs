@@ -32,7 +32,7 @@ impl LastAnswer {
         is_new
     }
 
-    /// Whether at least so many cycles were sent in this time, and none was answered.
+    /// Whether at least this number of cycles was sent in this time, and none was answered.
     pub fn is_older_than(&self, (time, cycles): (Duration, u64), words: &Words, now: Instant) -> bool {
         let is_old = |last: &Answer| now.since(last.at) >= time && words.cycles.wrapping_sub(last.cycles) >= cycles;
         self.0.as_ref().is_some_and(is_old)

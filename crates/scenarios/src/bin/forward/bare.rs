@@ -9,7 +9,7 @@ use ringcat::packet::ReceiveMode;
 
 /// EtherType of EtherCAT.
 const ETHERTYPE: u16 = 0x88A4;
-/// A wait ends after this time, to look whether it is over.
+/// A wait ends after this time, to check whether the run is over.
 const LOOK_MS: libc::c_int = 5;
 /// Longest frame, without FCS.
 const LONGEST: usize = 1_514;

@@ -31,7 +31,7 @@ const FRAMES: usize = 500;
 const PAUSE: Duration = Duration::from_micros(500);
 /// A frame that has not arrived by then is lost.
 const LOST: Duration = Duration::from_millis(50);
-/// A forwarder looks this often whether it is to end.
+/// Interval at which a forwarder checks whether it is to end.
 const LOOK: Duration = Duration::from_millis(5);
 /// Most frames of a block that may be lost: those while its forwarder starts.
 const MOST_LOST: usize = FRAMES / 10;
