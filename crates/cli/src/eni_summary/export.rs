@@ -27,7 +27,7 @@ const ABOUT_EXPORT: &str = "\
 The ENI has every command that a MainDevice sends to bring the network to OP.
 It is read again before it is written: what an ENI cannot express is refused
 with the SubDevice and the reason, or listed as a warning where the network
-comes to OP without it. docs/eni.md has the list.
+reaches OP without it. docs/eni.md has the list.
 
   ringcat init --main eth1 --out machine.toml
   ringcat eni export --network machine.toml --out machine.eni.xml

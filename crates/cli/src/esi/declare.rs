@@ -37,7 +37,7 @@ pub struct DeclareArguments {
     device: DeviceArguments,
     #[command(flatten)]
     choices: ChoiceArguments,
-    /// Name of the SubDevice; its type without
+    /// Name of the SubDevice; by default its type
     #[arg(long, value_name = "NAME", help_heading = "Network")]
     name: Option<String>,
     /// The SubDevice and the port that its port 0 is plugged into: Coupler:1

@@ -21,7 +21,7 @@ pub struct DeviceArguments {
     /// Type of the device in it
     #[arg(long = "type", value_name = "TYPE", help_heading = "Device")]
     pub kind: Option<String>,
-    /// Revision of the device; the highest without
+    /// Revision of the device; by default the highest
     #[arg(long, value_name = "REVISION", value_parser = number_of_32_bits, help_heading = "Device")]
     pub revision: Option<u32>,
     /// Product code, where several devices have one type and revision

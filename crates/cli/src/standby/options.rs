@@ -71,7 +71,7 @@ pub struct StandbyArguments {
     /// bus. A time below the pauses that this computer makes switches them off without need: this program then ends.
     #[arg(long, value_name = "TIME", value_parser = guarding::limit, default_value = "20ms", help_heading = "Run")]
     pub guard: Duration,
-    /// Without such a process
+    /// Use no such process
     #[arg(long, conflicts_with = "guard", help_heading = "Run")]
     pub no_guard: bool,
     /// How long, such as 10s or 5min; until Ctrl-C by default

@@ -320,8 +320,8 @@ fn clock_notices(device: &Device, mode: &OpMode, into: &mut SubDevice, from: &mu
     if mode.shift_0_for_inputs && sync.sync0_shift.0 != 0 {
         let (mode, shift) = (mode.name.trim(), sync.sync0_shift.0);
         from.note(format!(
-            "operation mode \"{mode}\": the shift of SYNC0 of {shift} ns refers to inputs, it counts from the beginning \
-             of the cycle"
+            "operation mode \"{mode}\": the shift of SYNC0 of {shift} ns refers to inputs, it counts from the \
+             beginning of the cycle"
         ));
     }
 }

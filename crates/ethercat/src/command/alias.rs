@@ -17,7 +17,7 @@ pub const COMMAND: Command = Command {
 
 Writes the alias and the checksum into the SII of the slave. The slave uses
 it from its next start on. More than one slave needs --force, and so does an
-SII whose checksum is wrong before.
+SII whose checksum was wrong before.
 ",
     options: SELECTION,
     output: Output::Nothing,

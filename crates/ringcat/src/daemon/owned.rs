@@ -1,8 +1,8 @@
 //! A bus that a daemon has handed over to this process.
 //!
-//! A thread receives the messages of the daemon ([`Receiver`]): questions of its clients, and the end of the connection.
-//! It sends the daemon what is known of the segment after each scan, so that no scan is necessary after a crash of this
-//! process.
+//! A thread receives the messages of the daemon ([`Receiver`]): questions of its clients, and the end of the
+//! connection. It sends the daemon what is known of the segment after each scan, so that no scan is necessary after a
+//! crash of this process.
 
 use std::os::fd::OwnedFd;
 use std::path::Path;
