@@ -80,7 +80,7 @@ const EXAMPLES: usize = 20;
 
 /// Up to which commit the language is reviewed; what is newer is `git log COMMIT..`.
 const REVIEWED: &str =
-    "up to 79dfece8, 2026-11-29: since the 28th pages but protocol and ethercat-json, not all comments";
+    "up to 92a43e0e, 2026-11-29: pages and comments; texts of JSON keys and of the schema since the 28th read only";
 
 /// Bars that are measured by running something: what, the bar, the command.
 pub const ELSEWHERE: [(&str, &str, &str); 8] = [
