@@ -184,8 +184,8 @@ figures() {
 demo() {
     local too_large=0
     cargo run --release
-    small ringcat 9950000 || too_large=1
-    small ringcatd 6800000 || too_large=1
+    small ringcat 10100000 || too_large=1
+    small ringcatd 6850000 || too_large=1
     small ethercat 1760000 || too_large=1
     return "$too_large"
 }
