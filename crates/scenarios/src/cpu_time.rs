@@ -16,7 +16,7 @@ pub fn process_cpu_time() -> Duration {
     ticks(&stat).map_or_else(|| panic!("/proc/self/stat is odd: {stat}"), |ticks| TICK * ticks)
 }
 
-/// Parts of a second that [`reference_work`] took on the machine on which the bars were set, without other programs.
+/// CPU time of [`reference_work`] on the machine for which bars are stated: figures are converted to it.
 pub const REFERENCE: Duration = Duration::from_millis(250);
 /// Words that [`reference_work`] changes: 8 MiB, about what the simulator of a thousand SubDevices touches.
 const REFERENCE_WORDS: usize = 1 << 20;
