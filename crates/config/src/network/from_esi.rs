@@ -65,8 +65,12 @@ impl SubDevice {
         subdevice.sync_manager =
             selection.sync_managers.iter().filter(|of| described(of)).map(|of| sync_manager(of, language)).collect();
         if let Some(mode) = selection.mode {
-            clock(selection, mode, cycle, &mut subdevice)?;
-            clock_notices(device, mode, &mut subdevice, &mut from);
+            if device.clock.as_ref().is_some_and(|clock| clock.time_loop_only) {
+                from.note("TimeLoopControlOnly: SYNC and LATCH units are not activated".into());
+            } else {
+                clock(selection, mode, cycle, &mut subdevice)?;
+            }
+            clock_notices(device, mode, subdevice.sync.as_ref(), &mut from);
         }
         if device.use_lrd_lwr {
             from.note("UseLrdLwr: its EEPROM decides whether it is in an LRW".into());
@@ -303,22 +307,18 @@ fn clock(selection: &Selection<'_>, mode: &OpMode, cycle: Duration, into: &mut S
     Ok(())
 }
 
-/// What a network file does not hold of the settings of clocks (protocol ES-63). A device of which SYNC
-/// registers are not written gets no signals.
-fn clock_notices(device: &Device, mode: &OpMode, into: &mut SubDevice, from: &mut Notes) {
+/// What a network file does not hold of the settings of clocks (protocol ES-63).
+fn clock_notices(device: &Device, mode: &OpMode, sync: Option<&Sync>, from: &mut Notes) {
     let Some(clock) = &device.clock else { return };
-    if clock.time_loop_only && into.sync.take().is_some() {
-        from.note("TimeLoopControlOnly: SYNC registers are not written, no signals are declared".into());
-    }
     if clock.is_32_bit {
         from.note("Unknown64Bit: the registers of its clock decide whether it has 32 or 64 bits".into());
     }
     if clock.external_reference {
         from.note("ExternalRefClock: choose the reference clock by `reference` of the table `clocks`".into());
     }
-    let Some(sync) = &into.sync else { return };
-    if mode.shift_0_for_inputs && sync.sync0_shift.0 != 0 {
-        let (mode, shift) = (mode.name.trim(), sync.sync0_shift.0);
+    let shift = sync.map_or(0, |sync| sync.sync0_shift.0);
+    if mode.shift_0_for_inputs && shift != 0 {
+        let mode = mode.name.trim();
         from.note(format!(
             "operation mode \"{mode}\": the shift of SYNC0 of {shift} ns refers to inputs, it counts from the \
              beginning of the cycle"

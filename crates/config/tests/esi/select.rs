@@ -101,8 +101,13 @@ fn a_shift_adds_time_and_part_of_the_cycle_and_lost_settings_of_clocks_are_told(
     let (found, notices) = shift(" Factor=\"-4\" Input=\"1\"", 1_000);
     assert_eq!((found, added(&notices).len()), (Some(251_000), 1));
     assert!(added(&notices)[0].contains("the shift of SYNC0 of 251000 ns refers to inputs"), "{notices:?}");
-    let (found, notices) = from(&ACME.replacen("<Dc>", "<Dc TimeLoopControlOnly=\"1\">", 1));
+    let loop_only = ACME.replacen("<Dc>", "<Dc TimeLoopControlOnly=\"1\">", 1);
+    let (found, notices) = from(&loop_only);
     assert_eq!((found, added(&notices).len()), (None, 1), "{notices:?}");
+    let latch = acme_of(&loop_only.replacen("<AssignActivate>#x0<", "<AssignActivate>#x0100<", 1));
+    let mode = choices(|choices| choices.mode = Some("FreeRun".to_owned()));
+    let writes = |it: &ringcat_config::network::model::Startup| it.write.is_some();
+    assert!(!declared(&latch, DRIVE, &mode).startup.iter().any(writes), "no unit is activated");
     let (_, notices) = from(&ACME.replacen("<Dc>", "<Dc Unknown64Bit=\"1\" ExternalRefClock=\"true\">", 1));
     assert_eq!(added(&notices).len(), 2, "{notices:?}");
     let other = "<AlternativeType RevisionNo=\"#x00640001\">AM01-0100</AlternativeType><Name>AM01 Modular";
