@@ -34,8 +34,8 @@ impl NetworkFile {
             failed(Some(line), "expected UTF-8 text".to_owned())
         })?;
         let tree = DeTable::parse(text).map_err(|error| {
-            let line = error.span().map_or_else(|| deepest_line(text), |span| line_of(text, span.start));
-            failed(Some(line), in_plain_words(error.message()))
+            let line = error.span().map_or_else(|| too_deep_line(text), |span| Some(line_of(text, span.start)));
+            failed(line, in_plain_words(error.message()))
         })?;
         let root = tree.get_ref();
         version(root).map_err(|fault| placed(name, text, root, &fault))?;
@@ -54,8 +54,11 @@ impl NetworkFile {
     }
 }
 
-/// The line with the most levels of tables and lists. The reader gives no place for levels beyond its limit.
-fn deepest_line(text: &str) -> usize {
+/// The line with the most levels of tables and lists, if these can be more than the reader takes: it gives no place for
+/// them.
+fn too_deep_line(text: &str) -> Option<usize> {
+    /// Levels that the reader takes.
+    const LEVELS: usize = 80;
     let (mut open, mut deepest) = (0_usize, (0, 1));
     for (number, line) in (1..).zip(text.lines()) {
         let mut most = open;
@@ -72,7 +75,7 @@ fn deepest_line(text: &str) -> usize {
             deepest = (levels, number);
         }
     }
-    deepest.1
+    (deepest.0 >= LEVELS).then_some(deepest.1)
 }
 
 /// The version comes first: a file of a later version may have any keys.
