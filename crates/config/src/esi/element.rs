@@ -61,7 +61,7 @@ impl<'a> Element<'a> {
         self.node.children().filter(Node::is_element).map(move |node| Element { node, file })
     }
 
-    /// Names of all elements in it, at any level.
+    /// Names of the element and of all elements in it, at any level.
     pub fn names_below(&self) -> impl Iterator<Item = &'a str> + use<'a> {
         self.node.descendants().filter(Node::is_element).map(|node| node.tag_name().name())
     }

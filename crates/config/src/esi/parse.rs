@@ -69,22 +69,20 @@ fn document<'a>(name: &str, text: &'a str) -> Result<Document<'a>, EsiError> {
     Ok(document)
 }
 
-/// What an element of encryption or a signature makes of a file (protocol ES-153).
-fn protection(name: &str) -> Option<&'static str> {
-    match name {
-        "EncryptedData" | "EncryptedKey" | "CipherData" => Some("an encrypted file (XML encryption)"),
-        "Signature" | "SignedInfo" => Some("a signed file (an XML signature, which RingCAT cannot check)"),
-        _ => None,
+/// What elements of encryption, at any level, or of a signature make of a file (protocol ES-153).
+fn protection(root: Element<'_>) -> Option<&'static str> {
+    let is_cipher = |name: &str| matches!(name, "EncryptedData" | "EncryptedKey" | "CipherData");
+    let is_signature = |name: &str| matches!(name, "Signature" | "SignedInfo");
+    if root.names_below().any(is_cipher) {
+        return Some("an encrypted file (XML encryption)");
     }
+    let is_signed = is_signature(root.name()) || root.all().any(|child| is_signature(child.name()));
+    is_signed.then_some("a signed file (an XML signature, which RingCAT cannot check)")
 }
 
 fn root(root: Element<'_>) -> Result<Esi, EsiError> {
     let version = root.attribute("Version").map(str::to_owned);
-    let names = std::iter::once(root.name()).chain(root.all().map(|child| child.name()));
-    // A part of a file may be encrypted, too.
-    let is_cipher = |name: &str| name == "EncryptedData" || name == "CipherData";
-    let inside = root.names_below().find(|name| is_cipher(name));
-    if let Some(kind) = names.chain(inside).filter_map(protection).next() {
+    if let Some(kind) = protection(root) {
         return Err(root.error(EsiProblem::WrongFile { kind: kind.to_owned() }));
     }
     match root.name() {

@@ -92,6 +92,13 @@ const ADDED: [(&str, &str, &str, &str); 24] = [
     ),
 ];
 
+// covers: esi-read, ES-65
+#[test]
+fn more_slots_than_a_device_has_are_noted() {
+    let found = notices("<Slot MinInstances=\"1\"", "<Slot MinInstances=\"300\"");
+    assert!(found.iter().any(|text| text.contains("MinInstances 300: a device has at most 255 slots")), "{found:?}");
+}
+
 // covers: ES-09, ES-10, esi-read
 #[test]
 fn each_edition_of_the_schema_is_read_and_what_is_not_used_is_named() {
