@@ -124,7 +124,7 @@ enum Command {
     ///
     /// Which SubDevices answer on which interface, where the ring is broken, errors of each cable. It only reads.
     Ring(ring::RingArguments),
-    /// Shows which settings of this machine disturb a MainDevice, and what corrects them
+    /// Shows which settings of this machine disturb a MainDevice, and their remedies
     ///
     /// Interfaces, kernel, processors, permissions, another MainDevice; how late a thread wakes up. It changes nothing.
     Doctor(doctor::DoctorArguments),
