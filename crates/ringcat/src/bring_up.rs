@@ -37,11 +37,16 @@ impl<L: Links> MainDevice<L> {
         mut self,
         declare: impl FnOnce(&Scan) -> Declaration,
     ) -> Result<Application<L>, Box<Refused<MainDevice<L>>>> {
-        let begun = self.engine.start_scan_for_operation().map_err(Error::from);
-        match begun.and_then(|()| self.finish_scan(|_| ())) {
+        match self.scan_for_operation() {
             Ok(scan) => self.activate(declare(&scan)),
             Err(error) => Err(Box::new(Refused { error, main_device: self })),
         }
+    }
+
+    /// Scans, and reads what operation needs of the SIIs.
+    pub(crate) fn scan_for_operation(&mut self) -> Result<Scan, Error> {
+        self.engine.start_scan_for_operation()?;
+        self.finish_scan(|_| ())
     }
 }
 
@@ -53,10 +58,15 @@ impl SupervisorThread {
     /// As [`SupervisorThread::scan`] and [`SupervisorThread::activate`]. The error contains the handle and the links
     /// for another attempt.
     pub fn bring_up<C: Links>(self, declare: impl FnOnce(&Scan) -> Declaration, links: C) -> Activated<C> {
-        let begun = self.act(Engine::start_scan_for_operation).and_then(|begun| Ok(begun?));
-        match begun.and_then(|()| self.finish_scan(|| ())) {
+        match self.scan_for_operation() {
             Ok(scan) => self.activate(declare(&scan), links),
             Err(error) => Err(Box::new(Refused { error, main_device: Ended { supervisor: self, links } })),
         }
+    }
+
+    /// Scans, and reads what operation needs of the SIIs.
+    pub(crate) fn scan_for_operation(&self) -> Result<Scan, Error> {
+        self.act(Engine::start_scan_for_operation)??;
+        self.finish_scan(|| ())
     }
 }

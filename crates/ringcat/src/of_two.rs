@@ -10,7 +10,7 @@ use ringcat_engine::main_device::{Listener, MainDevice as Engine, MainDeviceRole
 use ringcat_engine::time::Instant;
 
 use crate::links::Links;
-use crate::standby::policy::Watch;
+use crate::standby::policy::{Watch, is_lower};
 use crate::standby::{ForwardingCounters, MAX_AGE, Reads, StoreAndForward};
 
 /// Frames that are older than this number of cycles are not forwarded: the ACTIVE has given them up.
@@ -60,7 +60,14 @@ impl OfTwo {
         {
             return forwarder.forward_and_read(links, engine) > 0;
         }
-        take_own(links, engine, now)
+        let any = take_own(links, engine, now);
+        if let Some(other) = engine.take_collision()
+            && is_lower(other, links.addresses().main)
+        {
+            // Without an application no other one can decide. A scan under way ends with an error.
+            engine.set_role(MainDeviceRole::Inactive);
+        }
+        any
     }
 
     /// Forwards the frames that have arrived while another thread has the acyclic half, and there is no application.

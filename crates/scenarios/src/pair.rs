@@ -91,6 +91,11 @@ impl Pair {
         self.start(host, Phase::Inactive, member::member);
     }
 
+    /// As [`Pair::start_member`], of one that does not listen before it becomes ACTIVE for the first time.
+    pub fn start_eager_member(&mut self, host: Host) {
+        self.start(host, Phase::Inactive, member::eager_member);
+    }
+
     /// Starts both, the first one earlier, and waits until all SubDevices are in OP and the second one follows.
     ///
     /// # Panics

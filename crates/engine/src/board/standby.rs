@@ -3,7 +3,7 @@
 //! The acyclic half of the ACTIVE posts its knowledge of the segment, which the cyclic half sends piece by piece; the
 //! cyclic half of the INACTIVE posts what it has heard.
 
-use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 
 use ringcat_wire::master_frame::{Diagnosis, DomainRecord};
 
@@ -14,6 +14,17 @@ use crate::time::Instant;
 pub const KNOWLEDGE_ROOM: usize = 256 * 1024;
 /// Room for a diagnosis with this number of domains.
 const DOMAINS: usize = 64;
+
+/// What a new ACTIVE goes on with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Takeover {
+    /// Nothing: all SubDevices are configured again from INIT on.
+    ThroughInit,
+    /// Process data of the other MainDevice: SubDevices keep their configuration.
+    FromOther,
+    /// What it has left itself: no other MainDevice was heard since. SubDevices keep their configuration.
+    FromItself,
+}
 
 /// The words.
 #[derive(Debug)]
@@ -28,9 +39,9 @@ pub struct StandbyWords {
     session: AtomicU32,
     /// Digest of its configuration.
     identity: AtomicU64,
-    /// The last takeover went on with process data of the other MainDevice.
-    is_hot: AtomicBool,
-    /// When a frame of the other MainDevice came last while there was no application; 0 before. Writers: both halves.
+    /// The last [`Takeover`], as a number.
+    takeover: AtomicU8,
+    /// When a frame of the other MainDevice came last while this one is INACTIVE; 0 before. Writers: both halves.
     heard_at: AtomicU64,
     /// Its version and the oldest one that could read it, if this MainDevice cannot; 0 otherwise.
     other_version: AtomicU32,
@@ -44,7 +55,7 @@ impl Default for StandbyWords {
             diagnosis: Sheet::new(Diagnosis::LEN + DOMAINS * DomainRecord::LEN),
             session: AtomicU32::new(0),
             identity: AtomicU64::new(0),
-            is_hot: AtomicBool::new(false),
+            takeover: AtomicU8::new(0),
             heard_at: AtomicU64::new(0),
             other_version: AtomicU32::new(0),
         }
@@ -58,15 +69,18 @@ impl StandbyWords {
         self.session.store(u32::from(session) + 1, Ordering::Release);
     }
 
-    /// Posts whether a takeover goes on with process data of the other MainDevice.
-    pub fn post_hot(&self, is_hot: bool) {
-        self.is_hot.store(is_hot, Ordering::Release);
+    /// Posts what this MainDevice goes on with as ACTIVE.
+    pub fn post_takeover(&self, takeover: Takeover) {
+        self.takeover.store(takeover as u8, Ordering::Release);
     }
 
-    /// Whether the last takeover went on with process data of the other MainDevice: SubDevices keep their
-    /// configuration.
-    pub fn is_hot(&self) -> bool {
-        self.is_hot.load(Ordering::Acquire)
+    /// What this MainDevice went on with when it became ACTIVE last.
+    pub fn takeover(&self) -> Takeover {
+        match self.takeover.load(Ordering::Acquire) {
+            1 => Takeover::FromOther,
+            2 => Takeover::FromItself,
+            _ => Takeover::ThroughInit,
+        }
     }
 
     /// Posts that a frame of the other MainDevice has come.

@@ -22,7 +22,8 @@ pub enum StandbyEvent {
         /// Why.
         cause: RoleCause,
     },
-    /// This MainDevice controls the bus, and goes on with the process data of the other one.
+    /// This MainDevice controls the bus, and goes on with the process data of the other one; with its own if it was
+    /// ACTIVE itself and has heard no other MainDevice since.
     TookOver {
         /// Time since a frame of the other MainDevice came last; `None` if none has come.
         silence: Option<Duration>,

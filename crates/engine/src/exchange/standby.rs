@@ -62,6 +62,7 @@ impl Exchange {
             other_version: None,
             noticed: None,
             begun_at: Instant::NEVER,
+            left_at: None,
             runs: planned.inputs.into_boxed_slice(),
             period_ns: period,
             control,

@@ -19,16 +19,17 @@ impl MainDevice {
     }
 
     /// Takes and fills a received frame of another MainDevice before it is forwarded, without an application: as
-    /// INACTIVE with the options of MainDevice redundancy. Any bytes are allowed. With an application it is
-    /// [`Exchange::fill`](crate::exchange::Exchange::fill).
+    /// INACTIVE with the options of MainDevice redundancy. Any bytes are allowed. With an application
+    /// [`Exchange::fill`](crate::exchange::Exchange::fill) does that, and here it is noted that a frame has come.
     pub fn fill(&mut self, arrived_on: Link, frame: &mut [u8], now: Instant) {
-        if self.role() != MainDeviceRole::Inactive || self.active().is_some() {
+        if self.role() != MainDeviceRole::Inactive {
             return;
         }
+        let has_application = self.active().is_some();
         let Some(standby) = &mut self.standby else { return };
         match &mut standby.listener {
-            Some(listener) => listener.fill(arrived_on, frame, now),
-            None => standby.words.post_heard(now),
+            Some(listener) if !has_application => listener.fill(arrived_on, frame, now),
+            _ => standby.words.post_heard(now),
         }
         self.report_version(now);
     }
@@ -54,6 +55,11 @@ impl MainDevice {
     /// Knowledge of the segment that the ACTIVE has sent, with which an application can follow it
     /// ([`MainDevice::follow`]); `None` before all of it has arrived.
     pub fn heard_knowledge(&self) -> Option<Knowledge> {
-        known(&self.standby.as_ref()?.words)
+        known(&self.standby.as_ref()?.words.heard)
+    }
+
+    /// What this MainDevice knew of the segment when it was ACTIVE last.
+    pub(super) fn published_knowledge(&self) -> Option<Knowledge> {
+        known(&self.standby.as_ref()?.words.knowledge)
     }
 }

@@ -8,6 +8,7 @@ use core::time::Duration;
 
 use ringcat_wire::master_frame::{Header, Lengths, NotReady};
 
+use crate::board::sheet::Sheet;
 use crate::board::standby::StandbyWords;
 use crate::exchange::following::{Following, Unusable};
 use crate::knowledge::Knowledge;
@@ -57,13 +58,13 @@ impl Listener {
         Heard {
             at: self.words.heard_at(),
             period: newest.map(period).filter(|period| !period.is_zero()),
-            is_known: self.words.header().is_some() && known(&self.words).is_some(),
+            is_known: self.words.header().is_some() && known(&self.words.heard).is_some(),
         }
     }
 }
 
-/// Knowledge of the ACTIVE, once all of it has arrived.
-pub(super) fn known(words: &StandbyWords) -> Option<Knowledge> {
-    let (_, bytes) = words.heard.copy()?;
+/// Knowledge of an ACTIVE, once all of it is there.
+pub(super) fn known(sheet: &Sheet) -> Option<Knowledge> {
+    let (_, bytes) = sheet.copy()?;
     Knowledge::from_bytes(&bytes).ok()
 }

@@ -2,6 +2,8 @@
 
 use alloc::sync::Arc;
 
+use ringcat_wire::frame::MacAddress;
+
 use super::identity::Configuration;
 use super::listener::Listener;
 use super::standby_options::StandbyOptions;
@@ -22,10 +24,21 @@ pub(super) struct Standby {
     pub listener: Option<Listener>,
     /// A version of the ACTIVE that cannot be read, and was reported.
     pub other_version: Option<u8>,
+    /// The last collision without an application.
+    pub collision: Option<Collision>,
     /// When the knowledge is made next, at the earliest and if nothing has changed.
     pub publish_at: (Instant, Instant),
     /// What the published knowledge was made from.
     pub published: Option<Marks>,
+}
+
+/// Frames of another ACTIVE have come.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Collision {
+    /// When the last one came.
+    pub at: Instant,
+    /// Its sender, until it is asked for.
+    pub source: Option<MacAddress>,
 }
 
 /// Numbers that change with most changes of the knowledge.
@@ -49,6 +62,7 @@ impl Standby {
             configuration: Configuration::default(),
             session: None,
             other_version: None,
+            collision: None,
             publish_at: (Instant(0), Instant(0)),
             published: None,
         }

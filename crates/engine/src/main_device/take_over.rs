@@ -4,13 +4,19 @@
 use alloc::rc::Rc;
 use alloc::vec::Vec;
 
+use core::time::Duration;
+
 use ringcat_wire::al::AlState;
+use ringcat_wire::frame::MacAddress;
 
 use super::MainDevice;
+use super::standby::Collision;
 use crate::board::live::{Life, Presence};
+use crate::board::standby::Takeover;
 use crate::declared::SubDeviceId;
 use crate::event::{Event, StandbyEvent};
 use crate::knowledge::{Handover, KnownMailbox};
+use crate::link::Link;
 use crate::mail::InUse;
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::shared_segment::Beside;
@@ -19,6 +25,9 @@ use crate::segment::clocks::ClockObservation;
 use crate::segment::setup::Setup;
 use crate::segment::{Observation, StandbyObservation};
 use crate::time::Instant;
+
+/// Frames of another ACTIVE belong to another collision after this time without any.
+const COLLISIONS_APART: Duration = Duration::from_millis(100);
 
 impl MainDevice {
     /// Follows a change of the role, and publishes what the other MainDevice needs. Without an application, requested
@@ -59,7 +68,32 @@ impl MainDevice {
         }
     }
 
-    /// The exchange goes on with the process data of the other MainDevice. The SubDevices stay as they are: none goes
+    /// A frame of another MainDevice has come while this one is ACTIVE without an application: a collision (protocol
+    /// MR-10), reported once for frames that follow each other.
+    pub(super) fn note_foreign(&mut self, arrived_on: Link, bytes: &[u8], now: Instant) {
+        if self.role() != MainDeviceRole::Active || self.active().is_some() {
+            return;
+        }
+        let (Some(standby), Some(source)) = (&mut self.standby, bytes.get(6..).and_then(<[u8]>::first_chunk)) else {
+            return;
+        };
+        let source = MacAddress(*source);
+        let last = standby.collision.replace(Collision { at: now, source: Some(source) });
+        if last.is_none_or(|last| now.since(last.at) > COLLISIONS_APART) {
+            let event = Event::Standby(StandbyEvent::Collision { arrived_on, source });
+            self.supervisor.append_event(now, event, 0);
+        }
+    }
+
+    /// Takes the address of another MainDevice of which a frame has come since the last call, while this one is ACTIVE
+    /// without an application; with one it is
+    /// [`Exchange::take_collision`](crate::exchange::Exchange::take_collision). Bytes 3 to 5 are those of its main
+    /// interface.
+    pub fn take_collision(&mut self) -> Option<MacAddress> {
+        self.standby.as_mut()?.collision.as_mut()?.source.take()
+    }
+
+    /// The exchange goes on with the process data of the other MainDevice, or with its own. The SubDevices stay as they are: none goes
     /// through INIT, no address and no register of SyncManagers or FMMUs is written. What was known is compared with
     /// the segment meanwhile; the first mail of each mailbox is as after a crash of its owner.
     fn take_over(&mut self) {
@@ -67,9 +101,10 @@ impl MainDevice {
         // The mirror of the other MainDevice ends.
         self.renew(events);
         let lives = self.lives();
-        self.learn_clocks();
+        let takeover = self.standby.as_ref().map_or(Takeover::ThroughInit, |standby| standby.words.takeover());
+        self.learn_clocks(takeover);
         self.adopt_mailboxes(&lives);
-        let is_hot = self.standby.as_ref().is_some_and(|standby| standby.words.is_hot());
+        let is_hot = takeover != Takeover::ThroughInit;
         let took_over = StandbyObservation::TookOver { lives: &lives, is_hot };
         self.segment.observe(Observation::Standby(took_over));
         let segment = self.segment.clone();
@@ -104,15 +139,19 @@ impl MainDevice {
         self.supervisor.attach_bell(self.requests.bell().clone());
     }
 
-    /// The SubDevices as the other MainDevice has seen them last.
+    /// The SubDevices as the ACTIVE before has seen them last.
     fn lives(&self) -> Vec<Life> {
         let live = &self.segment.board.live;
         (0..live.count()).map(|subdevice| live.life(subdevice).unwrap_or_default()).collect()
     }
 
-    /// The last measurement of the clocks by the other MainDevice.
-    fn learn_clocks(&self) {
-        let known = self.heard_knowledge().and_then(|knowledge| knowledge.clocks);
+    /// The last measurement of the clocks by the ACTIVE before.
+    fn learn_clocks(&self, takeover: Takeover) {
+        let knowledge = match takeover {
+            Takeover::FromItself => self.published_knowledge(),
+            Takeover::FromOther | Takeover::ThroughInit => self.heard_knowledge(),
+        };
+        let known = knowledge.and_then(|knowledge| knowledge.clocks);
         if let Some(known) = known.filter(|_| self.segment.view().clocks().are_declared()) {
             self.segment.observe_clocks(ClockObservation::Known(Rc::new(known)));
         }

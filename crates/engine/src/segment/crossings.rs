@@ -126,6 +126,14 @@ impl Crossings {
         Crossings { junctions, ports: Vec::new(), search: Search::Idle, reported }
     }
 
+    /// A search under way has ended without a result.
+    #[cfg(feature = "standby")]
+    pub fn end_search(&mut self) {
+        if self.search == Search::UnderWay {
+            self.search = Search::Again;
+        }
+    }
+
     pub fn reported(&self) -> &LineCheck {
         &self.reported
     }

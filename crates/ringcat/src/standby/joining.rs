@@ -4,11 +4,11 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use ringcat_engine::Scan;
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{ActivateError, Declaration, Heard};
 use ringcat_engine::role::{RoleControl, RoleRequest};
 use ringcat_engine::time::Instant;
+use ringcat_engine::{Scan, ScanError};
 
 use super::policy::Dice;
 use super::{ForwardingCounters, NeedsTwoLinks, Policy};
@@ -111,7 +111,9 @@ impl<L: Links> MainDevice<L> {
     }
 
     /// Becomes ACTIVE without an application, whatever the other MainDevice does: then a scan, or
-    /// [`MainDevice::bring_up`], is allowed.
+    /// [`MainDevice::bring_up`], is allowed. If another one is ACTIVE as well, the one with the lower address stays
+    /// ([`OnCollision`](super::OnCollision)): a scan of the other one ends with
+    /// [`ScanError::RoleChanged`], and [`Joining`] begins again.
     pub fn become_active(&mut self) {
         self.role_control().request(RoleRequest::Active);
         self.work();
@@ -187,7 +189,11 @@ impl<L: Links> MainDevice<L> {
                 Next::Follow => break self.follow(declare)?,
                 Next::BecomeActive => {
                     self.become_active();
-                    break self.bring_up(declare)?;
+                    match self.scan_for_operation() {
+                        Ok(scan) => break self.activate(declare(&scan))?,
+                        Err(Error::Scan(ScanError::RoleChanged)) => joining = Joining::begin(&self, policy),
+                        Err(error) => return Err(Box::new(Refused { error, main_device: self })),
+                    }
                 }
             }
         };

@@ -14,7 +14,8 @@ use ringcat_wire::frame::MacAddress;
 /// Fewer cycles without process data may be those of a single fault of a cable.
 const LEAST_CYCLES: u32 = 3;
 
-/// What an ACTIVE does that receives frames of another ACTIVE (protocol MR-10).
+/// What an ACTIVE with an application does that receives frames of another ACTIVE (protocol MR-10). Without one, during
+/// a scan, it is always [`OnCollision::LowerAddressStays`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum OnCollision {
@@ -104,6 +105,11 @@ impl Policy {
     }
 }
 
+/// Whether bytes 3 to 5 of an address are lower than those of another one.
+pub(crate) fn is_lower(MacAddress([.., a, b, c]): MacAddress, MacAddress([.., d, e, f]): MacAddress) -> bool {
+    [a, b, c] < [d, e, f]
+}
+
 /// What is known when a cycle begins.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Situation {
@@ -121,8 +127,8 @@ pub(crate) struct Situation {
 pub(crate) struct Watch {
     policy: Policy,
     time_out: Duration,
-    /// Bytes 3 to 5 of the own address.
-    own: [u8; 3],
+    /// The own main address.
+    own: MacAddress,
     dice: Dice,
     /// The random pause, and since when this MainDevice is INACTIVE for which it was chosen.
     pause: (Instant, Duration),
@@ -131,9 +137,8 @@ pub(crate) struct Watch {
 impl Watch {
     /// For cycles of this period, of a MainDevice with this main address.
     pub fn new(policy: Policy, period: Duration, main: MacAddress, now: Instant) -> Watch {
-        let ([.., a, b, c], dice) = (main.0, Dice::new(main, now));
-        let time_out = policy.time_out_of(period);
-        Watch { policy, time_out, own: [a, b, c], dice, pause: (Instant::NEVER, Duration::ZERO) }
+        let (time_out, dice) = (policy.time_out_of(period), Dice::new(main, now));
+        Watch { policy, time_out, own: main, dice, pause: (Instant::NEVER, Duration::ZERO) }
     }
 
     /// What is requested in the cycle that begins now.
@@ -155,9 +160,9 @@ impl Watch {
         }
     }
 
-    fn yields_to(&self, MacAddress([.., a, b, c]): MacAddress) -> bool {
+    fn yields_to(&self, other: MacAddress) -> bool {
         match self.policy.on_collision {
-            OnCollision::LowerAddressStays => [a, b, c] < self.own,
+            OnCollision::LowerAddressStays => is_lower(other, self.own),
             OnCollision::Yield => true,
             OnCollision::Stay => false,
         }

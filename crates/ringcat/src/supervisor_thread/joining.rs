@@ -3,9 +3,9 @@
 
 use std::time::Duration;
 
-use ringcat_engine::Scan;
 use ringcat_engine::main_device::{ActivateError, Active, Declaration, Listener, MainDevice as Engine};
 use ringcat_engine::role::{RoleControl, RoleRequest};
+use ringcat_engine::{Scan, ScanError};
 
 use super::{Activated, Ended, SupervisorThread};
 use crate::application::Application;
@@ -107,11 +107,13 @@ impl<C: Links> Listening<C> {
                     Err(error) => return Err(self.refused(error)),
                 },
                 Next::BecomeActive => {
-                    let Listening { supervisor, links, .. } = self;
-                    return match supervisor.become_active() {
-                        Ok(()) => supervisor.bring_up(declare, links),
-                        Err(error) => Err(Box::new(Refused { error, main_device: Ended { supervisor, links } })),
-                    };
+                    let scan = self.supervisor.become_active().and_then(|()| self.supervisor.scan_for_operation());
+                    match scan {
+                        Ok(scan) => return self.supervisor.activate(declare(&scan), self.links),
+                        // Another MainDevice is ACTIVE as well, and stays so.
+                        Err(Error::Scan(ScanError::RoleChanged)) => joining = Joining::on(&self.links, policy),
+                        Err(error) => return Err(self.refused(error)),
+                    }
                 }
             }
         }

@@ -47,6 +47,8 @@ pub struct Seen {
     pub followed: u64,
     /// Outputs that an INACTIVE has seen were written so many cycles before, at most.
     pub oldest_followed: u64,
+    /// Takeovers in which it has configured all SubDevices again.
+    pub cold_takeovers: u32,
     /// Events of MainDevice redundancy, as text.
     pub events: Vec<String>,
 }

@@ -4,9 +4,10 @@ use std::ops::Range;
 use std::time::Duration;
 
 use ringcat::simulated::two_hosts::HostLinks;
-use ringcat::standby::{Joining, Next, Policy, StandbyOptions};
+use ringcat::standby::{Joining, Next, Policy, StandbyEvent, StandbyOptions};
 use ringcat::{
-    Application, DomainId, DomainState, Error, Event, MainDevice, MainDeviceRole, Options, ProcessData, Scan, automatic,
+    Application, DomainId, DomainState, Error, Event, MainDevice, MainDeviceRole, Options, ProcessData, Scan,
+    ScanError, automatic,
 };
 
 use super::board::{Board, Phase};
@@ -20,9 +21,18 @@ const SLICE: Duration = Duration::from_millis(1);
 const LISTEN: Duration = Duration::from_millis(30);
 
 /// Joins, and writes the number of the cycle to all outputs, in either role.
-pub(super) fn member(mut links: HostLinks, board: &Board) {
+pub(super) fn member(links: HostLinks, board: &Board) {
+    run(links, board, LISTEN);
+}
+
+/// As [`member`], and does not listen before it becomes ACTIVE for the first time.
+pub(super) fn eager_member(links: HostLinks, board: &Board) {
+    run(links, board, Duration::ZERO);
+}
+
+fn run(mut links: HostLinks, board: &Board, listen: Duration) {
     links.switch(true);
-    let failure = exchange(links, board).err();
+    let failure = exchange(links, board, listen).err();
     board.note(|seen| {
         seen.phase = Phase::Ended;
         seen.failure = failure.map(|error| error.to_string());
@@ -38,10 +48,12 @@ struct Shown {
     age: Option<u64>,
 }
 
-fn exchange(links: HostLinks, board: &Board) -> Result<(), Error> {
+fn exchange(links: HostLinks, board: &Board, listen: Duration) -> Result<(), Error> {
     let options = Options::default().with_standby(StandbyOptions::default());
     let policy = Policy::default().with_time_out(TIME_OUT_CYCLES, Duration::ZERO).with_listen(LISTEN);
-    let mut application = join(MainDevice::request(links, &options), &policy, board)?;
+    let main_device = MainDevice::request(links, &options);
+    let joining = Joining::begin(&main_device, &policy.with_listen(listen));
+    let mut application = join(main_device, joining, &policy, board)?;
     application.set_policy(Some(policy));
     let outputs = outputs_of(&application, application.states().len());
     let mut is_running = application.role() == MainDeviceRole::Inactive;
@@ -60,16 +72,20 @@ fn exchange(links: HostLinks, board: &Board) -> Result<(), Error> {
             work(data, &outputs)
         });
         is_running |= application.all_settled() && shown.is_complete;
-        note(board, &mut application, &shown);
+        // All SubDevices are configured again.
+        is_running &= !note(board, &mut application, &shown);
     }
     application.into_links().switch(false);
     Ok(())
 }
 
 /// As [`MainDevice::join`], and notes when it becomes ACTIVE.
-fn join(main_device: MainDevice<HostLinks>, policy: &Policy, board: &Board) -> Result<Application<HostLinks>, Error> {
-    let mut main_device = main_device;
-    let mut joining = Joining::begin(&main_device, policy);
+fn join(
+    mut main_device: MainDevice<HostLinks>,
+    mut joining: Joining,
+    policy: &Policy,
+    board: &Board,
+) -> Result<Application<HostLinks>, Error> {
     let declare = |scan: &Scan| automatic(&scan.subdevices, CYCLE);
     loop {
         main_device.listen(SLICE)?;
@@ -79,7 +95,16 @@ fn join(main_device: MainDevice<HostLinks>, policy: &Policy, board: &Board) -> R
                 let now = main_device.now();
                 board.note(|seen| seen.begin(Phase::Starting, now));
                 main_device.become_active();
-                return Ok(main_device.bring_up(declare)?);
+                match main_device.bring_up(declare) {
+                    Ok(application) => return Ok(application),
+                    Err(refused) if matches!(refused.error, Error::Scan(ScanError::RoleChanged)) => {
+                        main_device = refused.main_device;
+                        let now = main_device.now();
+                        board.note(|seen| seen.begin(Phase::Inactive, now));
+                        joining = Joining::begin(&main_device, policy);
+                    }
+                    Err(refused) => return Err(refused.error),
+                }
             }
             _ => main_device.attend(SLICE),
         }
@@ -108,10 +133,13 @@ fn work(data: &mut ProcessData<'_>, outputs: &[Range<usize>]) -> Shown {
     }
 }
 
-fn note(board: &Board, application: &mut Application<HostLinks>, shown: &Shown) {
+/// Shows a cycle on the board. Whether it took over through INIT.
+fn note(board: &Board, application: &mut Application<HostLinks>, shown: &Shown) -> bool {
     let mut events = Vec::new();
+    let mut is_cold = false;
     while let Some(event) = application.pop_event() {
         if let Event::Standby(event) = event.event {
+            is_cold |= matches!(event, StandbyEvent::TookOver { is_hot: false, .. });
             events.push(format!("{event:?}"));
         }
     }
@@ -129,5 +157,7 @@ fn note(board: &Board, application: &mut Application<HostLinks>, shown: &Shown) 
         }
         seen.forwarded = application.forwarded();
         seen.events.extend(events);
+        seen.cold_takeovers += u32::from(is_cold);
     });
+    is_cold
 }

@@ -23,6 +23,8 @@ type Frame = ([u8; 3], u8, u8);
 #[derive(Clone, Debug, Default)]
 struct Taken {
     at: Option<SimTime>,
+    /// Since the outputs before.
+    gap: Duration,
     /// The number of the cycle.
     cycle: Option<u64>,
 }
@@ -86,9 +88,13 @@ impl Outputs {
         std::mem::take(&mut self.longest_gap)
     }
 
-    /// When a SubDevice took outputs last.
-    pub(super) fn last_taken(&self, device: usize) -> Option<SimTime> {
-        self.taken[device].at
+    /// How long a SubDevice has been without outputs; before those of the last cycle, if that was longer. `None` if it
+    /// never took any.
+    pub(super) fn silence(&self, device: usize, now: SimTime) -> Option<Duration> {
+        let taken = &self.taken[device];
+        let silence = now - taken.at?;
+        let is_recent = silence.as_nanos() <= u128::from(2 * self.cycle_ns);
+        Some(if is_recent { silence.max(taken.gap) } else { silence })
     }
 
     /// Checks what the SubDevices have taken since the last call.
@@ -110,11 +116,12 @@ impl Outputs {
             let outputs = access.data.get(moved.at..moved.at + moved.len).unwrap_or_default();
             let taken = &mut self.taken[device.0];
             let before = taken.at.replace(at);
+            taken.gap = before.map_or(Duration::ZERO, |before| at - before);
             // Those of an application that has not written any yet, or does not any more.
             if outputs.iter().all(|byte| *byte == 0) {
                 continue;
             }
-            self.longest_gap = self.longest_gap.max(before.map_or(Duration::ZERO, |before| at - before));
+            self.longest_gap = self.longest_gap.max(taken.gap);
             let (age, name) = (age(outputs, now), device.0);
             let frame = (access.identity, access.frame.0, access.frame.1);
             let is_recent = u32::try_from(age).is_ok_and(|age| age <= self.max_age);

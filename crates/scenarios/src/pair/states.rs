@@ -12,6 +12,9 @@ use super::outputs::Outputs;
 
 /// A step of a watchdog's divider.
 const WATCHDOG_STEP_NS: u64 = 40;
+/// A cycle: the log of outputs has those of a frame that ends damaged, too, because its sender has lost its power. They
+/// do not trigger the watchdog.
+const DAMAGED_NS: u64 = super::CYCLE.as_nanos() as u64;
 
 /// Checks states.
 #[derive(Debug)]
@@ -42,10 +45,14 @@ impl States {
             if from != op || may_change || !is.controller.is_powered() {
                 continue;
             }
-            let silent = outputs.last_taken(device.0).map_or(u64::MAX, |at| network.now().0.saturating_sub(at.0));
+            let silent = outputs.silence(device.0, network.now()).map_or(u64::MAX, |time| time.as_nanos() as u64);
             let allowed = watchdog_ns(is);
             let name = device.0;
-            assert!(silent >= allowed, "device {name} leaves OP after {silent} ns without outputs, watchdog {allowed}");
+            assert!(
+                silent + DAMAGED_NS >= allowed,
+                "device {name} leaves OP for {to} ({}) after {silent} ns without outputs, watchdog {allowed}",
+                is.al_status_code()
+            );
         }
         lines
     }

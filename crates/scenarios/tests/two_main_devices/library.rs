@@ -206,16 +206,32 @@ fn of_two_that_start_at_the_same_time_one_becomes_active_and_the_other_one_follo
     }
 }
 
+// covers: standby, MR-10, 9.9
+#[test]
+fn of_two_that_begin_to_scan_at_the_same_time_one_yields_and_follows() {
+    for (count, apart) in [(1, 0), (3, 0), (8, 0), (3, 1), (8, 7), (8, 12), (33, 3), (33, 20)] {
+        let mut pair = Pair::without_programs(14, ring_of_two(count, Host::First));
+        // Also the one with the lower address later: it stays nevertheless.
+        pair.start_eager_member(Host::Second);
+        pair.run_cycles(apart);
+        pair.start_eager_member(Host::First);
+        pair.until_ready(Host::First);
+        assert_eq!(pair.seen(Host::Second).phase, Phase::Inactive, "{}", pair.log());
+    }
+}
+
+/// Takes the links of the first one down, or brings them up.
+fn disconnect(pair: &mut Pair, down: bool) {
+    pair.say(format!("links of the first one are down: {down}"));
+    let links = Host::First.links();
+    pair.hosts().with_network(|network| links.into_iter().for_each(|link| network.disconnect(link, down)));
+}
+
 // covers: standby, MR-25, MR-26
 #[test]
 fn an_active_that_loses_its_links_and_gets_them_back_follows_the_other_one() {
     let mut pair = Pair::of_members(12, ring_of_two(8, Host::First));
     pair.take_longest_gap();
-    let disconnect = |pair: &mut Pair, down: bool| {
-        pair.say(format!("links of the first one are down: {down}"));
-        let links = Host::First.links();
-        pair.hosts().with_network(|network| links.into_iter().for_each(|link| network.disconnect(link, down)));
-    };
     disconnect(&mut pair, true);
     pair.run_cycles(50);
     let gap = pair.take_longest_gap();
@@ -226,6 +242,33 @@ fn an_active_that_loses_its_links_and_gets_them_back_follows_the_other_one() {
     pair.until_ready(Host::Second);
     assert!(pair.take_longest_gap() <= 3 * CYCLE && pair.all_in_op(), "{}", pair.log());
     assert_eq!(pair.ring(Host::Second), RingState::Closed, "{}", pair.log());
+}
+
+// covers: standby, MR-16, MR-25, MR-27
+#[test]
+fn an_active_that_no_other_one_replaces_goes_on_with_its_subdevices() {
+    // How many cycles its links are down. Watchdogs expire after 100.
+    for (count, down) in [(3, 0), (8, 0), (8, 30), (33, 30), (8, 150)] {
+        let mut pair = Pair::of_members(13, ring_of_two(count, Host::First));
+        pair.hosts().guard(Host::Second, CYCLE);
+        pair.kill(Host::Second);
+        pair.run_cycles(50);
+        pair.take_longest_gap();
+        if down > 0 {
+            disconnect(&mut pair, true);
+            pair.run_cycles(down);
+            disconnect(&mut pair, false);
+        } else {
+            pair.request(Host::First, RoleRequest::Inactive);
+        }
+        pair.run_cycles(150);
+        let (gap, seen) = (pair.take_longest_gap(), pair.seen(Host::First));
+        let here = format!("{count} SubDevices, links down for {down} cycles: {gap:?}\n{}", pair.log());
+        assert!(seen.phase == Phase::Active && seen.is_last_complete && seen.cold_takeovers == 0, "{here}");
+        assert!(pair.all_in_op(), "{here}");
+        // A time-out and a random pause of a time-out at most.
+        assert!(gap <= CYCLE * (down + 2 * TIME_OUT_CYCLES + 2), "{here}");
+    }
 }
 
 // covers: standby, MR-22

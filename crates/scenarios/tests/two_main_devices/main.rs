@@ -7,6 +7,7 @@ mod collisions;
 mod following;
 mod library;
 mod outside_links;
+mod random_runs;
 mod rows;
 mod taking_over;
 mod threads;

@@ -27,6 +27,7 @@ impl Exchange {
         if let Some(state) = self.standby.0.as_deref_mut()
             && state.role == MainDeviceRole::Inactive
         {
+            state.words.post_heard(now);
             state.following.fill(arrived_on, frame, now);
         }
     }

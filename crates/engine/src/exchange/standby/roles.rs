@@ -1,9 +1,12 @@
 //! Changes of the role, at the beginning of a cycle (protocol MR-02, MR-07).
 
-use ringcat_wire::master_frame::{Answer, Phase};
+use ringcat_wire::master_frame::{Answer, Header, Phase};
 
 use super::Exchange;
 use super::state::State;
+use crate::board::Board;
+use crate::board::live::Presence;
+use crate::board::standby::Takeover;
 use crate::domain::DomainStatus;
 use crate::event::CyclicStandbyEvent;
 use crate::exchange::domain::Domain;
@@ -66,7 +69,7 @@ impl Exchange {
         self.events.push(event.pack());
         match role {
             MainDeviceRole::Active => self.take_over(now),
-            MainDeviceRole::Inactive => self.yield_role(),
+            MainDeviceRole::Inactive => self.yield_role(now),
         }
         Some(role)
     }
@@ -82,20 +85,25 @@ impl Exchange {
             let images = self.domains.iter_mut().map(Domain::image_mut);
             images.enumerate().for_each(|(domain, image)| outputs.go_on(domain, image));
         }
-        let is_hot = state.is_hot();
-        let in_state = if is_hot { state.take_part(&self.board) } else { 0 };
-        state.words.post_hot(is_hot);
+        let takeover = state.takeover();
+        let in_state = match takeover {
+            Takeover::ThroughInit => 0,
+            Takeover::FromOther => state.take_part(&self.board),
+            Takeover::FromItself => settled(&self.board),
+        };
+        state.words.post_takeover(takeover);
         let silence = last.map(|(_, at)| now.since(at));
         if let Some((cycle, _)) = last {
             state.frames.cycle = cycle;
         }
         state.frames.header.phase = Phase::Goes;
         state.become_role(MainDeviceRole::Active);
+        let is_hot = takeover != Takeover::ThroughInit;
         self.events.push(CyclicStandbyEvent::TookOver { silence, in_state, is_hot }.pack());
     }
 
     /// The other MainDevice may control the bus from this cycle on: nothing is sent any more.
-    fn yield_role(&mut self) {
+    fn yield_role(&mut self, now: Instant) {
         let left = self.cycle + 1;
         let Some(state) = self.standby.0.as_deref_mut() else { return };
         self.frames.iter_mut().for_each(CyclicFrame::close);
@@ -108,6 +116,7 @@ impl Exchange {
         }
         self.decide_at = Instant::NEVER;
         state.following.reset();
+        state.left_at = Some(now);
         state.frames.end();
         state.become_role(MainDeviceRole::Inactive);
     }
@@ -124,12 +133,18 @@ impl State {
         self.control.set(role);
     }
 
-    /// Whether SubDevices can go on as the other MainDevice has left them: their registers are those of this
-    /// configuration. Otherwise they are configured again from INIT on, which is a warm takeover (protocol MR-18).
-    fn is_hot(&self) -> bool {
-        let Some(whole) = self.following.whole() else { return false };
-        let is_same = whole.header.identity == self.frames.header.identity;
-        !self.goes_through_init && is_same && whole.header.session == self.frames.header.session
+    /// Whether SubDevices can go on as they were left: their registers are those of this configuration. Otherwise they
+    /// are configured again from INIT on, which is a warm takeover (protocol MR-18).
+    fn takeover(&self) -> Takeover {
+        let (own, heard_at) = (&self.frames.header, self.words.heard_at());
+        let is_same = |other: &Header| other.identity == own.identity && other.session == own.session;
+        match self.following.whole() {
+            _ if self.goes_through_init => Takeover::ThroughInit,
+            Some(whole) if is_same(&whole.header) => Takeover::FromOther,
+            // A frame that came in the moment of the change may be of another ACTIVE.
+            None if self.left_at.is_some_and(|left| heard_at.is_none_or(|at| at < left)) => Takeover::FromItself,
+            _ => Takeover::ThroughInit,
+        }
     }
 
     /// Whether the ACTIVE has ended with the newest cycle, in which this MainDevice has accepted its role.
@@ -144,4 +159,10 @@ impl State {
         let header = self.following.header_of(cycle);
         header.is_some_and(|(header, _)| header.phase == Phase::Ends) && self.following.has_accepted(cycle)
     }
+}
+
+/// Number of SubDevices in their target states.
+fn settled(board: &Board) -> u16 {
+    let lives = (0..board.live.count()).filter_map(|subdevice| board.live.life(subdevice));
+    lives.filter(|life| life.presence == Presence::Settled).count() as u16
 }

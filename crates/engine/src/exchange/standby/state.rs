@@ -69,6 +69,8 @@ pub(in crate::exchange) struct State {
     pub noticed: Option<u32>,
     /// When that began.
     pub begun_at: Instant,
+    /// When this MainDevice ended its last time as ACTIVE.
+    pub left_at: Option<Instant>,
     /// Inputs in the images.
     pub runs: Box<[InputRun]>,
     pub period_ns: u64,

@@ -3,11 +3,13 @@
 use ringcat_wire::al::{AlState, AlStatus};
 
 use crate::board::live::{Life, Presence};
+use crate::segment::attention::Attention;
 use crate::segment::effect::{Check, Effects, Watch};
 use crate::segment::member::Phase;
 use crate::segment::model::Segment;
 use crate::segment::observation::StandbyObservation;
 use crate::segment::start::Start;
+use crate::segment::undeclared::Upkeep;
 
 impl Segment {
     /// Observes what another MainDevice of the ring does.
@@ -72,13 +74,19 @@ impl Segment {
         self.board.set_taking_part(index, exchanges);
     }
 
-    /// Another MainDevice controls the bus: attempts have ended, and it restores what was altered for a moment.
+    /// Another MainDevice controls the bus: it restores what was altered for a moment. Attempts, rounds of reads and
+    /// searches have ended without a result, and begin again when this one controls it.
     fn yield_bus(&mut self) {
         self.slot = self.slot.emptied();
         self.altered.clear();
         self.port_controls.clear();
+        self.attention = Attention::default();
+        self.crossings.end_search();
         for member in self.subdevices.members_mut() {
             member.attempt = member.attempt.wrapping_add(1);
+        }
+        for (_, _, unassigned) in self.subdevices.all_unassigned_mut() {
+            unassigned.upkeep.iter_mut().for_each(Upkeep::end_attempt);
         }
     }
 

@@ -67,6 +67,18 @@ pub struct Upkeep {
 }
 
 impl Upkeep {
+    /// An attempt or a reading under way has ended without a result: the next one is due.
+    #[cfg(feature = "standby")]
+    pub(in crate::segment) fn end_attempt(&mut self) {
+        self.attempt = self.attempt.wrapping_add(1);
+        if self.progress == UpkeepProgress::UnderWay {
+            self.progress = UpkeepProgress::Due(Instant::default());
+        }
+        if self.reading == PdoReading::UnderWay {
+            self.reading = PdoReading::Open;
+        }
+    }
+
     /// PREOP is requested, and the first attempt is due at this time.
     pub(in crate::segment) fn due(at: Instant) -> Upkeep {
         let progress = UpkeepProgress::Due(at);
