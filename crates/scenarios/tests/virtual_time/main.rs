@@ -34,6 +34,7 @@ mod ended_disturbances;
 mod eni;
 mod esi;
 mod esi_declared;
+mod esi_dictionary;
 mod ethernet;
 mod explorer;
 mod failures;
