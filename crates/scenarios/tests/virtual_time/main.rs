@@ -35,6 +35,7 @@ mod eni;
 mod esi;
 mod esi_declared;
 mod esi_dictionary;
+mod esi_fixed;
 mod ethernet;
 mod explorer;
 mod failures;
