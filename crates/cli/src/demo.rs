@@ -5,6 +5,8 @@ mod drive;
 mod incident;
 mod plan;
 mod report;
+#[cfg(feature = "standby")]
+mod two;
 mod watch;
 
 use std::path::{Path, PathBuf};
@@ -59,11 +61,34 @@ pub struct DemoArguments {
     /// Run in virtual time, as fast as the machine can
     #[arg(long, help_heading = "Cycle")]
     fast: bool,
+    /// Show two controllers at the ring, one of which is killed
+    ///
+    /// Both run with the library, and either takes over from the other: when it is killed, loses its power, or hands
+    /// its role over while a cable is cut. See docs/standby.md, which begins with a note on patents.
+    #[cfg(feature = "standby")]
+    #[arg(long, help_heading = "Two controllers")]
+    pub standby: bool,
+    /// Cycles without the ACTIVE after which the other one takes over, 3
+    ///
+    /// Where the watchdogs of the SubDevices expire before that, they leave OP and the demonstration fails.
+    #[cfg(feature = "standby")]
+    #[arg(
+        long,
+        value_name = "CYCLES",
+        requires = "standby",
+        value_parser = number(3_u32..=1000, 10),
+        help_heading = "Two controllers"
+    )]
+    timeout: Option<u32>,
 }
 
 /// Runs the demonstration.
 pub fn run(arguments: &DemoArguments) -> Result<Report, Failure> {
     EndRequest::at_once()?;
+    #[cfg(feature = "standby")]
+    if arguments.standby {
+        return two::run(arguments);
+    }
     Ok(show(arguments)?)
 }
 
