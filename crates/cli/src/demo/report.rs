@@ -36,7 +36,7 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
 }
 
 /// Writes lines with the time before them.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Reporter {
     terminal: bool,
     /// A progress line is on the screen and has not been ended.
@@ -73,6 +73,12 @@ impl Reporter {
     pub fn check(&mut self, check: Check) {
         self.say(&format!("  {} {}", if check.held { "ok    " } else { "FAILED" }, check.text));
         self.checks.push(check);
+    }
+
+    /// What was checked so far.
+    #[cfg(feature = "standby")]
+    pub fn checks(&self) -> &[Check] {
+        &self.checks
     }
 
     /// What was checked in the end.

@@ -21,13 +21,15 @@ use ringcat::standby::{Policy, RoleRequest};
 use ringcat::text::Names;
 use ringcat::{Event, Instant, MainDeviceRole, RingState};
 
+use super::arguments::DemoArguments;
 use super::report::Reporter;
 use super::watch::device_at;
-use super::{CYCLE, DemoArguments, SLOW_ABOVE, SLOW_CYCLE};
 use crate::failure::Failure;
+use crate::json::data::Data;
 use crate::verdict::{Report, Verdict};
 use controller::{Settings, Shared};
 use judge::Judge;
+use report::{Incident, Outcome};
 use steps::{STEPS, Step, Times, cable_to_cut, name};
 
 /// Cycles without the ACTIVE after which the other one takes over, by default.
@@ -59,21 +61,10 @@ struct Two {
     incidents: Vec<Incident>,
 }
 
-/// An incident that was.
-struct Incident {
-    number: usize,
-    step: Step,
-    at: Instant,
-    text: String,
-    /// What was not as expected at its end.
-    failure: Option<String>,
-}
-
 /// Runs the demonstration.
 pub fn run(arguments: &DemoArguments) -> Result<Report, Failure> {
-    let segment = super::load(arguments).map_err(|error| Failure::new(error.to_string()))?;
-    let slow = segment.devices.len() > SLOW_ABOVE;
-    let cycle = arguments.cycle_us.map_or(if slow { SLOW_CYCLE } else { CYCLE }, Duration::from_micros);
+    let segment = arguments.load().map_err(|error| Failure::new(error.to_string()))?;
+    let cycle = arguments.cycle(segment.devices.len());
     let mut network =
         Network::from_description(with_two_hosts(segment)?).map_err(|error| Failure::new(error.to_string()))?;
     network.log_hosts();
@@ -82,11 +73,7 @@ pub fn run(arguments: &DemoArguments) -> Result<Report, Failure> {
     let cable = cable_to_cut(&network).ok_or_else(no_ring)?;
     let time_out_cycles = arguments.timeout.unwrap_or(TIME_OUT_CYCLES);
     let mut reporter = Reporter::new();
-    reporter.say(&format!(
-        "RingCAT demo on {} with two controllers, {}",
-        super::segment_title(arguments),
-        super::pace(arguments)
-    ));
+    reporter.say(&format!("RingCAT demo on {} with two controllers, {}", arguments.segment_title(), arguments.pace()));
     reporter.say(&format!("cycle {} us, time-out {time_out_cycles} cycles", cycle.as_micros()));
     let two = Two {
         hosts: TwoHosts::new(network),
@@ -138,8 +125,26 @@ impl Two {
         for step in STEPS {
             self.step(step)?;
         }
-        let verdict = self.summary();
+        let mut reporter = std::mem::take(&mut self.reporter);
+        let verdict = self.outcome().summary(&mut reporter);
+        self.reporter = reporter;
         Ok(self.report(verdict))
+    }
+
+    fn report(self, verdict: Verdict) -> Report {
+        let data = self.outcome().data(self.reporter.checks());
+        Report { verdict, data: Data::DemoStandby(data) }
+    }
+
+    fn outcome(&self) -> Outcome<'_> {
+        Outcome {
+            judge: self.judge.as_ref(),
+            incidents: &self.incidents,
+            times: self.times,
+            names: &self.names,
+            shared: &self.shared,
+            late: self.began.map(|_| self.late),
+        }
     }
 
     /// From now on all is judged: everything is in OP, and the other controller is ready.

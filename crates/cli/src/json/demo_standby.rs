@@ -44,7 +44,7 @@ pub struct Noticed {
     pub subdevice: usize,
     /// Its name
     pub name: String,
-    /// Longest time between outputs in each incident, in nanoseconds; between inputs without outputs, empty without both
+    /// Longest time between outputs in each incident, or inputs without outputs, in nanoseconds; empty without both
     pub longest_ns: Vec<u64>,
     /// Changes of its state
     pub state_changes: u32,

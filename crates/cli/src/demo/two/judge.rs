@@ -307,7 +307,7 @@ mod tests {
         assert_eq!(old.as_deref(), Some("are 4 cycles old"));
         let early = Newest::default().cycle_fault(&[0x02], 0x01);
         assert_eq!(early.as_deref(), Some("are -1 cycles old"), "of a cycle that has not begun");
-        assert_eq!(Newest::default().cycle_fault(&[0x00, 0x00], 0x5000).is_some(), true, "zeros are an old cycle");
+        assert!(Newest::default().cycle_fault(&[0x00, 0x00], 0x5000).is_some(), "zeros are an old cycle");
         let mut drive = Newest::default();
         let mut take = |target: i32| drive.target_fault(&[&[0x0F, 0][..], &target.to_le_bytes()].concat(), 2);
         assert_eq!((take(i32::MAX - 1), take(i32::MAX), take(i32::MIN)), (None, None, None), "it turns for ever");

@@ -3,15 +3,17 @@
 
 use std::time::Duration;
 
+use ringcat::sim::cable::Host;
+use ringcat::text::Names;
 use ringcat::{Instant, MainDeviceRole};
 
+use super::super::report::Reporter;
+use super::controller::Shared;
 use super::judge::{Judge, Watched};
-use super::steps::{STEPS, Step, name};
-use super::{Incident, Two};
-use crate::json::data::Data;
+use super::steps::{STEPS, Step, Times, name};
 use crate::json::demo::Check;
 use crate::json::demo_standby::{DemoStandby, Noticed, StandbyIncident};
-use crate::verdict::{Report, Verdict};
+use crate::verdict::Verdict;
 
 /// Up to this number of SubDevices each has a line.
 const LISTED: usize = 64;
@@ -20,27 +22,55 @@ const NAME: usize = 12;
 /// Cycles in which both controllers may send: one yields.
 const MOST_TOGETHER: u32 = 2;
 
-impl Two {
+/// An incident that was.
+#[derive(Debug)]
+pub struct Incident {
+    /// Its number, from 1.
+    pub number: usize,
+    /// What it is.
+    pub step: Step,
+    /// When it began.
+    pub at: Instant,
+    /// The same in words.
+    pub text: String,
+    /// What was not as expected at its end.
+    pub failure: Option<String>,
+}
+
+/// What the demonstration has shown.
+#[derive(Debug)]
+pub struct Outcome<'a> {
+    /// What the SubDevices have noticed; `None` where not all reached OP.
+    pub judge: Option<&'a Judge>,
+    /// What happened.
+    pub incidents: &'a [Incident],
+    /// Times on which limits depend.
+    pub times: Times,
+    /// Names of the SubDevices.
+    pub names: &'a Names,
+    /// What the controllers have shown.
+    pub shared: &'a Shared,
+    /// Largest delay of virtual time behind the wall clock, if it waited for that.
+    pub late: Option<Duration>,
+}
+
+impl Outcome<'_> {
     /// Prints the table and what was checked.
-    pub(super) fn summary(&mut self) -> Verdict {
-        let Some(judge) = self.judge.take() else { return Verdict::Failed("nothing was judged".to_owned()) };
-        self.table(&judge);
-        let checks = self.checks(&judge);
+    pub fn summary(&self, reporter: &mut Reporter) -> Verdict {
+        let Some(judge) = self.judge else { return Verdict::Failed("nothing was judged".to_owned()) };
+        self.table(judge, reporter);
+        let checks = self.checks(judge);
         let failed = checks.iter().filter(|check| !check.held).map(|check| check.text.clone()).collect();
-        self.reporter.say("");
-        for check in checks {
-            self.reporter.check(check);
-        }
+        reporter.say("");
+        checks.into_iter().for_each(|check| reporter.check(check));
         for text in &judge.described {
-            self.reporter.say(&format!("         {text}"));
+            reporter.say(&format!("         {text}"));
         }
-        self.judge = Some(judge);
         Verdict::of(failed, "everything held")
     }
 
-    fn table(&mut self, judge: &Judge) {
+    fn table(&self, judge: &Judge, reporter: &mut Reporter) {
         let limits = self.limits();
-        let reporter = &mut self.reporter;
         reporter.say("\nlongest time between outputs in each SubDevice, in ms; without outputs: between");
         reporter.say("inputs. AL: changes of its state. WD: watchdogs that expired.\n");
         let cells = |cells: &[String]| cells.iter().map(|cell| format!("{cell:>7}")).collect::<String>();
@@ -48,9 +78,9 @@ impl Two {
         let words: Vec<String> = STEPS.iter().map(|step| step.word().to_owned()).collect();
         reporter.say(&format!("{:16}{}", "", cells(&numbers)));
         reporter.say(&format!("{:<16}{}  AL  WD", "SubDevice", cells(&words)));
-        let line = |who: &str, longest: &[Duration], changes: u32, watchdogs: u32| {
+        let line = |head: &str, longest: &[Duration], changes: u32, watchdogs: u32| {
             let times: Vec<String> = (0..STEPS.len()).map(|at| longest.get(at).map_or("-".to_owned(), ms)).collect();
-            format!("{who:<16}{}{changes:>4}{watchdogs:>4}", cells(&times))
+            format!("{head:<16}{}{changes:>4}{watchdogs:>4}", cells(&times))
         };
         if judge.watched.len() <= LISTED {
             for (position, it) in judge.watched.iter().enumerate() {
@@ -60,13 +90,13 @@ impl Two {
         } else {
             let longest: Vec<Duration> = (0..STEPS.len()).map(|at| judge.longest(at)).collect();
             let sum = |of: fn(&Watched) -> u32| judge.watched.iter().map(of).sum();
-            let who = format!("all {}", judge.watched.len());
-            reporter.say(&line(&who, &longest, sum(|it| it.state_changes), sum(|it| it.watchdogs)));
+            let head = format!("all {}", judge.watched.len());
+            reporter.say(&line(&head, &longest, sum(|it| it.state_changes), sum(|it| it.watchdogs)));
         }
         let limits: Vec<String> = limits.iter().map(ms).collect();
         reporter.say(&format!("{:<16}{}   0   0", "at most", cells(&limits)));
-        if self.began.is_some() {
-            let late = self.late.as_secs_f64() * 1e3;
+        if let Some(late) = self.late {
+            let late = late.as_secs_f64() * 1e3;
             reporter.say(&format!("\nthis machine was at most {late:.3} ms late; virtual time waited"));
         }
     }
@@ -133,9 +163,9 @@ impl Two {
         checks
     }
 
-    /// The verdict with the keys of JSON.
-    pub(super) fn report(self, verdict: Verdict) -> Report {
-        let judge = self.judge.as_ref();
+    /// The keys of JSON.
+    pub fn data(&self, checks: &[Check]) -> DemoStandby {
+        let judge = self.judge;
         let incidents = self.incidents.iter().enumerate().map(|(at, incident)| StandbyIncident {
             time_ns: incident.at.since(Instant(0)).as_nanos() as u64,
             text: incident.text.clone(),
@@ -150,15 +180,14 @@ impl Two {
             expired_watchdogs: it.watchdogs,
         });
         let is_active = |host| self.shared.board(host).role == Some(MainDeviceRole::Active);
-        let data = DemoStandby {
+        DemoStandby {
             cycle_ns: nanoseconds(self.times.cycle),
             time_out_cycles: self.times.time_out_cycles,
-            active: ringcat::sim::cable::Host::ALL.into_iter().find(|host| is_active(*host)).map(name),
+            active: Host::ALL.into_iter().find(|host| is_active(*host)).map(name),
             incidents: incidents.collect(),
             subdevices: noticed.collect(),
-            checks: self.reporter.into_checks(),
-        };
-        Report { verdict, data: Data::DemoStandby(data) }
+            checks: checks.to_vec(),
+        }
     }
 }
 
