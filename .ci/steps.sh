@@ -180,10 +180,11 @@ figures() {
     cargo run --quiet --package tidy -- figures
 }
 
-# The README's first command, and the sizes of the programs that a release has.
+# The README's first commands, and the sizes of the programs that a release has.
 demo() {
     local too_large=0
     cargo run --release
+    cargo run --release -- demo --standby
     small ringcat 10100000 || too_large=1
     small ringcatd 6850000 || too_large=1
     small ethercat 1760000 || too_large=1

@@ -1,18 +1,18 @@
 //! `ringcat demo`: a simulated segment goes from power-on to OP and exchanges process data at 1 kHz. A cable is cut and
 //! repaired, a SubDevice loses its power and gets it back. The program compares all of it with the simulated devices.
 
+mod arguments;
 mod drive;
 mod incident;
 mod plan;
 mod report;
+#[cfg(feature = "standby")]
+mod two;
 mod watch;
 
-use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use clap::Args;
 use ringcat::sim::network::Network;
-use ringcat::sim::segment::{DEMO, Segment};
 use ringcat::simulated::SimulatedSegment;
 use ringcat::text::Names;
 use ringcat::{Application, Error, Event, MainDevice, Options, Scan, automatic};
@@ -23,89 +23,45 @@ use crate::json::data::Data;
 use crate::json::demo;
 use crate::json::scan::SubDevice;
 use crate::json::values::State;
-use crate::numbers::number;
 use crate::table;
 use crate::verdict::{Report, Verdict};
+pub use arguments::DemoArguments;
 use incident::Incident;
 use plan::Plan;
 use report::Reporter;
 use watch::Watch;
 
-/// Above this number of SubDevices a frame takes longer than a millisecond to come back.
-const SLOW_ABOVE: usize = 200;
-/// Cycle of such a segment.
-const SLOW_CYCLE: Duration = Duration::from_millis(4);
-/// Cycle of any other.
-const CYCLE: Duration = Duration::from_millis(1);
 /// Up to this number of SubDevices, each one's way to OP is printed.
 const LISTED: usize = 64;
 /// From activation to OP of the last SubDevice at the most.
 const OP_LIMIT: Duration = Duration::from_secs(30);
 
-/// Options of `ringcat demo`.
-#[derive(Args, Debug, Default)]
-pub struct DemoArguments {
-    /// Segment file (see docs/segments.md); an embedded ring by default
-    #[arg(long, value_name = "FILE.toml", help_heading = "Segment")]
-    segment: Option<PathBuf>,
-    /// Cycle time in microseconds; 1000 by default, 4000 above 200 SubDevices
-    #[arg(
-        long,
-        value_name = "US",
-        help_heading = "Cycle",
-        value_parser = number(50u64..=1_000_000, 1_000)
-    )]
-    cycle_us: Option<u64>,
-    /// Run in virtual time, as fast as the machine can
-    #[arg(long, help_heading = "Cycle")]
-    fast: bool,
-}
-
 /// Runs the demonstration.
 pub fn run(arguments: &DemoArguments) -> Result<Report, Failure> {
     EndRequest::at_once()?;
+    #[cfg(feature = "standby")]
+    if arguments.standby {
+        return two::run(arguments);
+    }
     Ok(show(arguments)?)
 }
 
 fn show(arguments: &DemoArguments) -> Result<Report, Error> {
-    let segment = load(arguments)?;
-    let title = segment_title(arguments);
+    let segment = arguments.load()?;
+    let title = arguments.segment_title();
     let mut links = SimulatedSegment::new(Network::from_description(segment)?);
     if !arguments.fast {
         links.pace();
     }
     let mut reporter = Reporter::new();
-    reporter.say(&format!("RingCAT demo on {title}, {}", pace(arguments)));
+    reporter.say(&format!("RingCAT demo on {title}, {}", arguments.pace()));
     let mut main_device = MainDevice::request(links, &Options::default());
     let scan = main_device.scan_with(|event| reporter.scan_event(event))?;
     let names = Names(scan.subdevices.iter().map(|info| info.name.clone()).collect());
     reporter.table(&scan);
-    let cycle = cycle(arguments, &scan);
+    let cycle = arguments.cycle(scan.subdevices.len());
     let application = main_device.activate(automatic(&scan.subdevices, cycle))?;
     Ok(Demo::new(application, scan, names, cycle, reporter).run())
-}
-
-fn load(arguments: &DemoArguments) -> Result<Segment, Error> {
-    Ok(match &arguments.segment {
-        Some(path) => ringcat::esi::load_segment(path)?,
-        None => Segment::from_toml(DEMO, Path::new("."))?,
-    })
-}
-
-fn segment_title(arguments: &DemoArguments) -> String {
-    arguments.segment.as_ref().map_or_else(|| "its embedded ring".to_owned(), |path| path.display().to_string())
-}
-
-fn pace(arguments: &DemoArguments) -> &'static str {
-    if arguments.fast { "in virtual time" } else { "in real time" }
-}
-
-fn cycle(arguments: &DemoArguments, scan: &Scan) -> Duration {
-    match arguments.cycle_us {
-        Some(us) => Duration::from_micros(us),
-        None if scan.subdevices.len() > SLOW_ABOVE => SLOW_CYCLE,
-        None => CYCLE,
-    }
 }
 
 struct Demo {

@@ -8,6 +8,8 @@ pub mod capture;
 pub mod clocks;
 pub mod data;
 pub mod demo;
+#[cfg(feature = "standby")]
+pub mod demo_standby;
 pub mod doctor;
 pub mod eni;
 pub mod esi;

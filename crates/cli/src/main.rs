@@ -202,6 +202,8 @@ impl Command {
     /// As the command line has it.
     fn name(&self) -> &'static str {
         match self {
+            #[cfg(feature = "standby")]
+            Command::Demo(arguments) if arguments.standby => "demo --standby",
             Command::Demo(_) => "demo",
             Command::Scan(_) => "scan",
             Command::Init(_) => "init",

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
 use ringcat::config::esi::Esi;
-use ringcat::config::esi::sii::{Comparison, Likeness, SiiOptions, SiiProfile, build, most_alike, skeleton};
+use ringcat::config::esi::sii::{Comparison, Likeness, SiiOptions, SiiProfile, Skeleton, build, most_alike, skeleton};
 use ringcat::esi::{EsiFailure, load};
 use ringcat::wire::sii::{Sii, SiiHeader};
 
@@ -278,9 +278,10 @@ fn described(arguments: &SkeletonArguments) -> Result<Report, Failure> {
     let path = &arguments.image;
     let failed = |text: String| Failure::new(format!("{}: {text}", path.display()));
     let bytes = image_of(path)?;
-    let xml = skeleton(&bytes).map_err(|error| failed(error.to_string()))?;
+    let Skeleton { text: xml, notices } = skeleton(&bytes).map_err(|error| failed(error.to_string()))?;
     let out = &arguments.out;
     fs::write(out, &xml).map_err(|error| Failure::new(format!("{} cannot be written: {error}", out.display())))?;
     let held = format!("a description of {} bytes in {}", xml.len(), out.display());
-    Ok(Report { verdict: Verdict::Held(held), data: Data::SiiSkeleton(SiiSkeleton { bytes: xml.len() }) })
+    notices.iter().for_each(warn);
+    Ok(Report { verdict: Verdict::Held(held), data: Data::SiiSkeleton(SiiSkeleton { bytes: xml.len(), notices }) })
 }

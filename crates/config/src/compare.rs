@@ -114,7 +114,10 @@ impl Configuration {
                     both.compare(&mut differences);
                     pairs.push((config, info));
                 }
-                Place::Missing { config } => differences.push(self.missing(config, &names, marks.fails(config))),
+                Place::Missing { config } => {
+                    let prevents_op = marks.misses(config, &self.declaration.subdevices[config]);
+                    differences.push(self.missing(config, &names, prevents_op));
+                }
                 Place::Additional { info } => differences.push(additional(&found[info], marks.shifts(info))),
             }
         }
@@ -124,7 +127,7 @@ impl Configuration {
         differences
     }
 
-    fn missing(&self, config: usize, names: &[String], fails: bool) -> Difference {
+    fn missing(&self, config: usize, names: &[String], prevents_op: bool) -> Difference {
         let declared = &self.declaration.subdevices[config];
         let (expected, place) = (&declared.expected, declared.address);
         let device = match (expected.vendor_id, expected.product_code) {
@@ -136,7 +139,7 @@ impl Configuration {
             subdevice: Some(SubDeviceId(config)),
             position: None,
             kind: DifferenceKind::Missing,
-            prevents_op: !declared.optional || fails,
+            prevents_op,
             text: format!("\"{}\" ({place}{device}) is missing{optional}", names[config]),
         }
     }

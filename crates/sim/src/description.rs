@@ -171,6 +171,9 @@ pub struct DeviceDescription {
     pub pdos: Vec<PdoDescription>,
     /// Objects in addition to the derived ones; they replace those with the same index.
     pub objects: Vec<Object>,
+    /// Objects of the description of the device that are derived here: the derived ones have their names. Those that
+    /// are not derived are in the dictionary as they are.
+    pub described: Vec<Object>,
     /// Indices of objects that a MainDevice cannot access: for it they do not exist.
     pub left_out: Vec<u16>,
     /// The dictionary falls back to that of power-on whenever the device is in INIT.
@@ -253,6 +256,7 @@ impl DeviceDescription {
             sync_managers: Vec::new(),
             pdos: Vec::new(),
             objects: Vec::new(),
+            described: Vec::new(),
             left_out: Vec::new(),
             forgets_pdos_in_init: false,
             mailbox: None,

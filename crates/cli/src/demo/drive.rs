@@ -1,7 +1,6 @@
 //! Servo drives of the demonstrated segment: enabled as CiA 402 says, then moved back and forth.
 
-use ringcat::simulated::SimulatedSegment;
-use ringcat::{Application, Entry, ProcessData, SubDeviceId};
+use ringcat::{AcyclicHalf, Application, Entry, Links, ProcessData, SubDeviceId};
 
 /// CONTROLWORD, STATUSWORD, MODES_OF_OPERATION, TARGET_POSITION, POSITION_ACTUAL_VALUE (CiA 402).
 const CONTROLWORD: u16 = 0x6040;
@@ -74,7 +73,7 @@ pub struct Drive {
 
 impl Drive {
     /// The drive that a SubDevice is, if its process data has what a drive needs.
-    pub fn find(application: &Application<SimulatedSegment>, subdevice: usize) -> Option<Drive> {
+    pub fn find<L: Links, H: AcyclicHalf>(application: &Application<L, H>, subdevice: usize) -> Option<Drive> {
         let entry = |index| application.entry(SubDeviceId(subdevice), index, 0);
         Some(Drive {
             subdevice,
@@ -104,6 +103,35 @@ impl Drive {
         } else {
             self.wanted = self.position;
         }
+        self.command(data);
+    }
+
+    /// One cycle of one of two controllers: the target is always the last one of the ACTIVE and a step, so that
+    /// another controller goes on where the first one has ended.
+    #[cfg(feature = "standby")]
+    pub fn go_on(&mut self, data: &mut ProcessData<'_>) {
+        self.state = State::decode(data.read(&self.statusword));
+        self.position = data.read_signed(&self.actual) as i32;
+        self.wanted = match self.state {
+            State::OperationEnabled => (data.read_signed(&self.target) as i32).wrapping_add(STEP),
+            _ => self.position,
+        };
+        self.command(data);
+    }
+
+    /// Bytes of the image in which the target position and the statusword begin.
+    #[cfg(feature = "standby")]
+    pub fn watched(&self) -> [usize; 2] {
+        [self.target.byte_offset(), self.statusword.byte_offset()]
+    }
+
+    /// Whether a statusword says that a drive is enabled.
+    #[cfg(feature = "standby")]
+    pub fn is_enabled(statusword: u16) -> bool {
+        State::decode(statusword.into()) == State::OperationEnabled
+    }
+
+    fn command(&self, data: &mut ProcessData<'_>) {
         // The entries are outputs of these widths: they were looked up as such.
         let _ = data.write(&self.controlword, self.state.controlword());
         let _ = data.write_signed(&self.target, self.wanted.into());

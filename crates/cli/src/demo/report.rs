@@ -36,7 +36,7 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
 }
 
 /// Writes lines with the time before them.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Reporter {
     terminal: bool,
     /// A progress line is on the screen and has not been ended.
@@ -69,12 +69,25 @@ impl Reporter {
         self.reached_op
     }
 
+    /// Something that was checked.
+    pub fn check(&mut self, check: Check) {
+        self.say(&format!("  {} {}", if check.held { "ok    " } else { "FAILED" }, check.text));
+        self.checks.push(check);
+    }
+
+    /// What was checked so far.
+    #[cfg(feature = "standby")]
+    pub fn checks(&self) -> &[Check] {
+        &self.checks
+    }
+
     /// What was checked in the end.
     pub fn into_checks(self) -> Vec<Check> {
         self.checks
     }
 
-    fn timed(&mut self, at: Instant, mark: &str, name: Option<String>, text: &str) {
+    /// A line with a time and a mark before the text.
+    pub fn timed(&mut self, at: Instant, mark: &str, name: Option<String>, text: &str) {
         write_event(at.since(Instant(0)), name, text);
         self.end_line();
         let mut lines = wrapped(text, WIDTH - INDENT).into_iter();
@@ -96,6 +109,13 @@ impl Reporter {
     /// Any other event.
     pub fn event(&mut self, event: &TimedEvent, names: &Names) {
         self.timed(event.at, " ", Some(name_of(&event.event)), &describe(event, names));
+    }
+
+    /// An event of one of two controllers.
+    #[cfg(feature = "standby")]
+    pub fn event_of(&mut self, controller: &str, event: &TimedEvent, names: &Names) {
+        let text = format!("{controller}: {}", describe(event, names));
+        self.timed(event.at, " ", Some(name_of(&event.event)), &text);
     }
 
     /// Something the demonstration does.
@@ -185,8 +205,7 @@ impl Reporter {
             if !held {
                 failed.push(text.clone());
             }
-            reporter.say(&format!("  {} {text}", if held { "ok    " } else { "FAILED" }));
-            reporter.checks.push(Check { held, text });
+            reporter.check(Check { held, text });
         };
         let left: Vec<String> =
             watch.left_op.iter().map(|(subdevice, status)| format!("{subdevice} ({status})")).collect();

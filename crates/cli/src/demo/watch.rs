@@ -281,7 +281,7 @@ impl Place {
 }
 
 /// A byte that differs from cycle to cycle and from SubDevice to SubDevice.
-fn pattern(number: u64, subdevice: usize, at: usize) -> u8 {
+pub fn pattern(number: u64, subdevice: usize, at: usize) -> u8 {
     (number as u8).wrapping_add((subdevice as u8).wrapping_mul(31)).wrapping_add((at as u8).wrapping_mul(7))
 }
 
@@ -290,7 +290,7 @@ fn gather(image: &[u8], areas: &[(usize, usize)]) -> Vec<u8> {
 }
 
 /// The device that got the station address of a position: branches make its order differ from that of the file.
-fn device_at(network: &Network, position: usize) -> DeviceIndex {
+pub fn device_at(network: &Network, position: usize) -> DeviceIndex {
     let station = (ringcat::FIRST_STATION as usize + position) as u16;
     let has_it = |device: &ringcat::sim::device::Device| {
         device.controller.register(map::STATION_ADDRESS, 2) == station.to_le_bytes()

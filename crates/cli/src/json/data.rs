@@ -6,6 +6,8 @@ use super::bench::{Cycles, Echo, Rate, RoundTrip};
 use super::capture::Capture;
 use super::clocks::Clocks;
 use super::demo::Demo;
+#[cfg(feature = "standby")]
+use super::demo_standby::DemoStandby;
 use super::doctor::Doctor;
 use super::eni::{EniExport, EniFile};
 use super::esi::{EsiDeclared, EsiList, EsiShow};
@@ -43,6 +45,8 @@ pub enum Data {
     SiiCompared(SiiCompared),
     SiiSkeleton(SiiSkeleton),
     Demo(Demo),
+    #[cfg(feature = "standby")]
+    DemoStandby(DemoStandby),
     Echo(Echo),
     RoundTrip(RoundTrip),
     Cycles(Cycles),

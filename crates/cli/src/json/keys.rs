@@ -7,7 +7,9 @@ use std::path::Path;
 
 use json_keys::{Table, check_keys, check_page, keys};
 
-use super::{bench, capture, clocks, demo, doctor, eni, esi, line, network, ring, run, scan, sii, sim, standby};
+use super::{
+    bench, capture, clocks, demo, demo_standby, doctor, eni, esi, line, network, ring, run, scan, sii, sim, standby,
+};
 
 /// The line before the tables.
 const BEGIN: &str =
@@ -38,6 +40,7 @@ fn all() -> Vec<Table> {
         ("`sii compare`", keys::<sii::SiiCompared>()),
         ("`sii skeleton`", keys::<sii::SiiSkeleton>()),
         ("`demo`", keys::<demo::Demo>()),
+        ("`demo --standby`", keys::<demo_standby::DemoStandby>()),
         ("`bench echo`", keys::<bench::Echo>()),
         ("`bench round-trip`", keys::<bench::RoundTrip>()),
         ("`bench cycles`", keys::<bench::Cycles>()),

@@ -31,6 +31,24 @@ fn a_demonstration_prints_events_and_a_result_with_the_documented_keys() {
     assert_eq!(errors, "result: ok: everything held\n", "the last line for people");
 }
 
+// covers: json, demo, standby
+#[cfg(feature = "standby")]
+#[test]
+fn a_demonstration_of_two_controllers_prints_the_documented_keys() {
+    let output = ringcat("demo --standby --fast --json");
+    let (said, errors) = (text(&output.stdout), text(&output.stderr));
+    let result = Page::read().check("demo --standby", &said);
+    assert_eq!((result["result"]["outcome"].as_str(), output.status.code()), (Some("ok"), Some(0)), "{errors}");
+    assert_eq!((result["active"].as_str(), result["time_out_cycles"].as_u64()), (Some("A"), Some(3)));
+    let incidents = result["incidents"].as_array().expect("incidents");
+    let within =
+        |it: &Value| it["longest_ns"].as_u64() > Some(0) && it["longest_ns"].as_u64() <= it["limit_ns"].as_u64();
+    assert!(incidents.len() == 8 && incidents.iter().all(within), "{incidents:#?}");
+    let lamps = &result["subdevices"][2];
+    assert_eq!((lamps["name"].as_str(), lamps["longest_ns"].as_array().map(Vec::len)), (Some("lamps"), Some(8)));
+    assert!(said.contains("\"event\":\"TookOver\""), "{said}");
+}
+
 // covers: json
 #[test]
 fn a_file_is_printed_with_the_documented_keys() {
@@ -167,6 +185,7 @@ fn what_cannot_be_done_is_an_object_too() {
         "sii compare FILE.missing --esi FILE.missing",
         "sii skeleton FILE.missing --out /tmp/never.xml",
         "demo --segment FILE.missing",
+        "demo --standby --segment FILE.missing",
         "bench echo --main no-such",
         "bench round-trip --main no-such",
         "bench cycles --main no-such",

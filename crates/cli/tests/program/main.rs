@@ -2,6 +2,8 @@
 
 mod daemon;
 mod demo;
+#[cfg(feature = "standby")]
+mod demo_standby;
 mod doctor;
 mod documented;
 mod exit_codes;

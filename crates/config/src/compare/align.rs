@@ -50,18 +50,19 @@ pub(super) fn align(configuration: &Configuration, found: &[SubDeviceInfo], stat
         (info_of[config], taken[info]) = (Some(info), true);
     }
     // What is missing here and additional there has moved.
+    let mut by_device = ByDevice::new(found);
     for config in declared.iter().copied().filter(|config| info_of[*config].is_none()).collect::<Vec<_>>() {
-        if let Some(info) = (0..found.len()).find(|info| !taken[*info] && is_device(config, *info)) {
+        if let Some(info) = by_device.first(device(&configs[config], stated.get(config)), &taken) {
             (info_of[config], taken[info], moved[config]) = (Some(info), true, true);
         }
     }
     // Another device in the place of the declared one, between the same neighbours.
     let gaps: Vec<usize> = declared.iter().copied().filter(|config| info_of[*config].is_none()).collect();
+    let before = before(&declared, configs.len());
     for config in gaps {
-        let before = declared.iter().rev().find(|other| **other < config).map(|other| info_of[*other]);
-        let info = match before {
+        let info = match before[config] {
             None => Some(0),
-            Some(info) => info.map(|info| info + 1),
+            Some(other) => info_of[other].map(|info| info + 1),
         };
         if let Some(info) = info.filter(|info| *info < found.len() && !taken[*info]) {
             (info_of[config], taken[info]) = (Some(info), true);
@@ -86,7 +87,7 @@ fn exact_positions(configs: &[SubDeviceConfig], info_of: &[Option<usize>], moved
 }
 
 fn in_order(info_of: &[Option<usize>], moved: &[bool], taken: &[bool]) -> Vec<Place> {
-    let mut places: Vec<Place> = info_of
+    let places: Vec<Place> = info_of
         .iter()
         .enumerate()
         .map(|(config, info)| match info {
@@ -94,19 +95,81 @@ fn in_order(info_of: &[Option<usize>], moved: &[bool], taken: &[bool]) -> Vec<Pl
             None => Place::Missing { config },
         })
         .collect();
-    for info in (0..taken.len()).filter(|info| !taken[*info]) {
-        let is_before = |place: &Place| match place {
-            Place::Both { info: other, moved, .. } => !moved && *other < info,
-            Place::Additional { info: other } => *other < info,
-            Place::Missing { .. } => false,
-        };
-        let at = places.iter().rposition(is_before).map_or(0, |at| at + 1);
-        places.insert(at, Place::Additional { info });
+    // The declared SubDevice behind which an additional one is named: the last one in the file of those before it.
+    let mut behind = vec![0; taken.len() + 1];
+    for (at, place) in places.iter().enumerate() {
+        if let Place::Both { info, moved: false, .. } = *place {
+            behind[info + 1] = at + 1;
+        }
     }
-    places
+    let mut last = 0;
+    let mut additional: Vec<(usize, usize)> = Vec::new();
+    for (info, at) in behind.into_iter().take(taken.len()).enumerate() {
+        last = last.max(at);
+        if !taken[info] {
+            additional.push((last, info));
+        }
+    }
+    let mut additional = additional.into_iter().peekable();
+    let mut ordered = Vec::with_capacity(places.len() + additional.len());
+    for (at, place) in places.into_iter().enumerate() {
+        while let Some((_, info)) = additional.next_if(|(behind, _)| *behind <= at) {
+            ordered.push(Place::Additional { info });
+        }
+        ordered.push(place);
+    }
+    ordered.extend(additional.map(|(_, info)| Place::Additional { info }));
+    ordered
 }
 
-const fn by_position(config: &SubDeviceConfig) -> bool {
+/// The declaration before each one: of those with a lower index that with the last position.
+fn before(declared: &[usize], count: usize) -> Vec<Option<usize>> {
+    let mut ranks = vec![None; count];
+    for (rank, config) in declared.iter().enumerate() {
+        ranks[*config] = Some(rank);
+    }
+    let mut last: Option<usize> = None;
+    let before_each = ranks.into_iter().map(|rank| {
+        let before = last.map(|rank| declared[rank]);
+        last = last.max(rank);
+        before
+    });
+    before_each.collect()
+}
+
+/// Vendor and product; `None`: any.
+type DeviceKey = (Option<u32>, Option<u32>);
+
+/// The SubDevices that were found, by what a declaration can say of their device.
+struct ByDevice {
+    /// In their order, from the last one on; those at the end may be taken.
+    places: BTreeMap<DeviceKey, Vec<usize>>,
+}
+
+impl ByDevice {
+    fn new(found: &[SubDeviceInfo]) -> ByDevice {
+        let mut places: BTreeMap<DeviceKey, Vec<usize>> = BTreeMap::new();
+        for (at, info) in found.iter().enumerate().rev() {
+            let (vendor, product) = (Some(info.identity.vendor_id), Some(info.identity.product_code));
+            for key in [(vendor, product), (vendor, None), (None, product), (None, None)] {
+                places.entry(key).or_default().push(at);
+            }
+        }
+        ByDevice { places }
+    }
+
+    /// The first one of a device that is not taken.
+    fn first(&mut self, key: DeviceKey, taken: &[bool]) -> Option<usize> {
+        let places = self.places.get_mut(&key)?;
+        while places.last().is_some_and(|at| taken[*at]) {
+            places.pop();
+        }
+        places.last().copied()
+    }
+}
+
+/// Whether a SubDevice is declared by its position.
+pub(super) const fn by_position(config: &SubDeviceConfig) -> bool {
     matches!(config.address, ConfigAddress::Position(_) | ConfigAddress::Alias { alias: 0, .. })
 }
 
@@ -137,11 +200,16 @@ fn by_mark(configs: &[SubDeviceConfig], found: &[SubDeviceInfo], info_of: &mut [
     }
 }
 
-/// Whether a found SubDevice has the vendor and the product of a declared one.
-fn is_device(config: &SubDeviceConfig, stated: Option<&Stated>, info: &SubDeviceInfo) -> bool {
+/// Vendor and product of a declared SubDevice.
+fn device(config: &SubDeviceConfig, stated: Option<&Stated>) -> DeviceKey {
     let stated = stated.and_then(|stated| stated.device);
     let vendor = config.expected.vendor_id.or(stated.map(|device| device.0));
-    let product = config.expected.product_code.or(stated.map(|device| device.1));
+    (vendor, config.expected.product_code.or(stated.map(|device| device.1)))
+}
+
+/// Whether a found SubDevice has the vendor and the product of a declared one.
+fn is_device(config: &SubDeviceConfig, stated: Option<&Stated>, info: &SubDeviceInfo) -> bool {
+    let (vendor, product) = device(config, stated);
     vendor.is_none_or(|vendor| vendor == info.identity.vendor_id)
         && product.is_none_or(|product| product == info.identity.product_code)
 }

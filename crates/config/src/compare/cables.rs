@@ -3,6 +3,8 @@
 //! A difference is only reported: process data depends on the order of the SubDevices, not on their ports. But the
 //! search for a broken cable with the drawing of the machine needs the real cabling.
 
+use std::collections::BTreeMap;
+
 use ringcat_engine::config::{Resolution, resolve};
 use ringcat_engine::declared::SubDeviceId;
 use ringcat_engine::info::SubDeviceInfo;
@@ -44,13 +46,16 @@ pub(super) fn compare(
         return Vec::new();
     }
     let mut place = vec![None; configs.len()];
+    let mut config_at = BTreeMap::new();
     for (config, info) in pairs {
-        place[*config] = Some(usize::from(found[*info].position.0));
+        let node = usize::from(found[*info].position.0);
+        place[*config] = Some(node);
+        config_at.insert(node, *config);
     }
     let names = configuration.names();
     // A SubDevice that is not in the file is named by its position.
-    let name = |node: usize| match place.iter().position(|place| *place == Some(node)) {
-        Some(config) => format!("\"{}\"", names[config]),
+    let name = |node: usize| match config_at.get(&node) {
+        Some(config) => format!("\"{}\"", names[*config]),
         None => format!("position {node}"),
     };
     let into =

@@ -1,10 +1,10 @@
 //! Which differences of places and identities prevent OP: the engine's own resolution of the declaration decides.
 
-use ringcat_engine::config::{ConfigAddress, ConfigError, Resolution, SubDeviceConfig, resolve};
+use ringcat_engine::config::{ConfigError, Resolution, SubDeviceConfig, resolve};
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::main_device::Required;
 
-use super::align::Place;
+use super::align::{Place, by_position};
 use crate::configuration::Configuration;
 
 /// What an activation does with the SubDevices that were found.
@@ -31,24 +31,29 @@ impl Marks {
         marks
     }
 
-    /// Whether the activation fails because of this declaration.
+    /// Whether the activation fails because of this declaration; with nothing required it fails because of none.
     pub(super) fn fails(&self, config: usize) -> bool {
-        match self.resolutions.get(config) {
-            Some(Resolution::Failed { .. }) => true,
-            Some(Resolution::Absent { .. }) => self.required == Required::All,
+        match (self.resolutions.get(config), self.required) {
+            (_, Required::Nothing) => false,
+            (Some(Resolution::Failed { .. }), _) => true,
+            (Some(Resolution::Absent { .. }), required) => required == Required::All,
             _ => false,
         }
     }
 
+    /// Whether a SubDevice that is missing prevents OP. With nothing required it does not: the engine finds those
+    /// behind it by their identities.
+    pub(super) fn misses(&self, config: usize, declared: &SubDeviceConfig) -> bool {
+        self.fails(config) || (!declared.optional && self.required != Required::Nothing)
+    }
+
     /// Whether an additional SubDevice takes the position of a declared one, or moves those behind it.
     pub(super) fn shifts(&self, info: usize) -> bool {
-        self.last_shifted.is_some_and(|last| info < last)
+        self.required != Required::Nothing && self.last_shifted.is_some_and(|last| info < last)
     }
 
     /// Whether a declaration by position fails, and not because of what its SubDevice is.
     fn is_shifted(&self, config: usize, declared: &SubDeviceConfig, info: &SubDeviceInfo) -> bool {
-        let by_position =
-            matches!(declared.address, ConfigAddress::Position(_) | ConfigAddress::Alias { alias: 0, .. });
         let is_own = match self.resolutions.get(config) {
             Some(Resolution::Failed { error: ConfigError::Mismatch { position, .. }, .. }) => {
                 *position == info.position
@@ -56,6 +61,6 @@ impl Marks {
             Some(Resolution::Failed { .. }) => false,
             _ => return false,
         };
-        by_position && declared.group.is_none() && !is_own
+        by_position(declared) && declared.group.is_none() && !is_own
     }
 }

@@ -14,4 +14,4 @@ pub use build::{SiiImage, build};
 pub use compare::{Comparison, FieldDifference, Likeness, compare, most_alike};
 pub use data_type::{code_of, name_of};
 pub use profile::{SiiOptions, SiiProfile};
-pub use skeleton::skeleton;
+pub use skeleton::{Skeleton, skeleton};

@@ -19,6 +19,8 @@ const MAX_VALUE: usize = 1 << 20;
 const PART_BYTES: usize = 64;
 /// CoE types by size, for types without a code: unsigned numbers, else bytes.
 const OCTETS: u16 = 0x0A;
+/// Code of BIT1; up to BIT16 they follow each other.
+const BIT1: u16 = 0x30;
 
 /// A subindex of an object.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -194,6 +196,8 @@ fn code(dictionary: &Dictionary, name: &str, bits: u32) -> u16 {
     }
     match bits {
         1 => 0x01,
+        // BIT2 to BIT7, BIT9 to BIT15.
+        2..=7 | 9..=15 => BIT1 + bits as u16 - 1,
         8 => 0x05,
         16 => 0x06,
         32 => 0x07,

@@ -161,10 +161,41 @@ fn a_whole_image_of_a_description_is_taken_as_it_is() {
 fn a_description_made_of_an_image_gives_the_same_image() {
     for text in [OUTPUTS, DRIVE] {
         let image = built(text, |options| options.sync1_factor = true);
-        let again = built(&sii::skeleton(&image).unwrap(), |options| options.sync1_factor = true);
+        let again = built(&sii::skeleton(&image).unwrap().text, |options| options.sync1_factor = true);
         assert_eq!(sii::compare(&image, &again).differences, []);
         assert_eq!(image, again);
     }
+}
+
+/// The drive with a mailbox that has no protocol.
+fn without_protocol() -> String {
+    let (before, rest) = DRIVE.split_once("<Mailbox").unwrap();
+    let (_, after) = rest.split_once("</Mailbox>").unwrap();
+    format!("{before}<Mailbox DataLinkLayer=\"1\"/>{after}")
+}
+
+// covers: ES-80, ES-105
+#[test]
+fn a_description_of_an_image_keeps_mailboxes_without_a_protocol() {
+    let image = built(&without_protocol(), |options| options.sync1_factor = true);
+    assert_eq!((&image[48..52], &image[56..58]), (&[0, 0x10, 0x80, 0][..], &[0, 0][..]));
+    let again = built(&sii::skeleton(&image).unwrap().text, |options| options.sync1_factor = true);
+    assert_eq!(sii::compare(&image, &again).differences, []);
+    assert_eq!(image, again);
+    assert!(sii::skeleton(&image).unwrap().notices.is_empty());
+}
+
+// covers: ES-80, ES-105
+#[test]
+fn mailboxes_that_a_description_cannot_say_are_notices() {
+    let mut image = built(&without_protocol(), |_| {});
+    image[50] = 0x60;
+    image[56] = 0x84;
+    let made = sii::skeleton(&image).unwrap();
+    assert!(made.text.contains("<CoE") && made.text.contains("<Mailbox"), "{}", made.text);
+    let mailboxes = "the mailboxes of the fixed area, 0x1000 (96 bytes) and 0x1080 (128 bytes), are not those of the \
+                     SyncManagers, 0x1000 (128 bytes) and 0x1080 (128 bytes), which the description has";
+    assert_eq!(made.notices, [mailboxes, "the protocols 0x0080 have no element in a description"]);
 }
 
 /// All real descriptions.

@@ -6,7 +6,7 @@
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use super::matching::{at_place, find_marked, missing};
+use super::matching::{Marked, at_place, missing};
 use super::resolution::Resolution;
 use super::{ConfigAddress, SubDeviceConfig};
 use crate::declared::GroupId;
@@ -60,10 +60,10 @@ pub fn groups<'a>(configs: impl IntoIterator<Item = &'a SubDeviceConfig>) -> Vec
 pub(super) fn find(
     configs: &[SubDeviceConfig],
     members: &[usize],
-    infos: &[&SubDeviceInfo],
+    (infos, marked): (&[&SubDeviceInfo], &Marked),
     resolutions: &mut [Option<Resolution>],
 ) {
-    let head = members.first().map_or(Ok(None), |head| find_marked(configs[*head].address, infos));
+    let head = members.first().map_or(Ok(None), |head| marked.find(configs[*head].address, infos));
     let mut intact = true;
     for (offset, config) in members.iter().enumerate() {
         let resolution = match head {

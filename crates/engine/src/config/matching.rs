@@ -1,8 +1,12 @@
 //! Whether the SubDevice at a place matches its declaration; finds an alias or identification.
 
+use alloc::vec::Vec;
+
 use super::resolution::{ConfigError, Resolution};
+use super::resolve::step;
 use super::{ConfigAddress, IdentityMismatch, SubDeviceConfig};
 use crate::info::SubDeviceInfo;
+use crate::order::InOrder;
 
 /// Resolution of a declaration with the SubDevice at `place`, an index in `infos`.
 pub(super) fn at_place(
@@ -33,16 +37,42 @@ pub(super) fn missing(declared: &SubDeviceConfig, config: usize, error: ConfigEr
     if declared.optional { Resolution::Absent { config, error } } else { Resolution::Failed { config, error } }
 }
 
-/// The only SubDevice with the alias or identification of an address; the first of the segment for alias 0.
-pub(super) fn find_marked(address: ConfigAddress, infos: &[&SubDeviceInfo]) -> Result<Option<usize>, ConfigError> {
-    if matches!(address, ConfigAddress::Alias { alias: 0, .. }) {
-        return Ok((!infos.is_empty()).then_some(0));
+/// The SubDevices by their aliases and identifications, in their order.
+pub(super) struct Marked {
+    aliases: Vec<(u16, usize)>,
+    identifications: Vec<(u16, usize)>,
+}
+
+impl Marked {
+    pub(super) fn new(infos: &[&SubDeviceInfo]) -> Marked {
+        let indexed = || infos.iter().enumerate();
+        let mut aliases: Vec<(u16, usize)> =
+            indexed().filter(|(_, info)| info.alias != 0).map(|(at, info)| (info.alias, at)).collect();
+        let mut identifications: Vec<(u16, usize)> =
+            indexed().filter_map(|(at, info)| Some((info.identification?, at))).collect();
+        aliases.put_in_order();
+        identifications.put_in_order();
+        Marked { aliases, identifications }
     }
-    let mut marked = infos.iter().enumerate().filter(|(_, info)| address.is_mark_of(info));
-    match (marked.next(), marked.next()) {
-        (Some((_, first)), Some((_, second))) => {
-            Err(ConfigError::Ambiguous { address, first: first.position, second: second.position })
+
+    /// The only SubDevice with the alias or identification of an address; the first of the segment for alias 0.
+    pub(super) fn find(&self, address: ConfigAddress, infos: &[&SubDeviceInfo]) -> Result<Option<usize>, ConfigError> {
+        let (marks, mark) = match address {
+            ConfigAddress::Alias { alias: 0, .. } => return Ok((!infos.is_empty()).then_some(0)),
+            ConfigAddress::Alias { alias, .. } => (&self.aliases, alias),
+            ConfigAddress::Identification { value, .. } => (&self.identifications, value),
+            ConfigAddress::Position(_) => return Ok(None),
+        };
+        let first = marks.partition_point(|(other, _)| *other < mark);
+        let mut marked = marks[first..].iter().take_while(|(other, _)| *other == mark).map(|(_, at)| *at);
+        let found = marked.next();
+        step();
+        match (found, marked.next()) {
+            (Some(first), Some(second)) => {
+                let [first, second] = [first, second].map(|at| infos[at].position);
+                Err(ConfigError::Ambiguous { address, first, second })
+            }
+            (first, _) => Ok(first),
         }
-        (first, _) => Ok(first.map(|(index, _)| index)),
     }
 }

@@ -8,12 +8,16 @@ use core::fmt;
 use ringcat_wire::address::Position;
 
 use super::groups::{self, groups};
-use super::matching::{at_place, find_marked, missing_error};
+use super::matching::{Marked, at_place, missing_error};
 use super::resolution::{ConfigError, Resolution};
 use super::{ConfigAddress, SubDeviceConfig};
 use crate::declared::SubDeviceId;
 use crate::info::SubDeviceInfo;
 use crate::order::InOrder;
+
+/// Declarations by position times optional ones among them, at most, of which all combinations are compared: each
+/// takes a byte.
+const MAX_COMBINATIONS: usize = 1 << 24;
 
 /// Two SubDevices with the same alias.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,32 +57,41 @@ pub fn duplicate_aliases(infos: &[SubDeviceInfo]) -> Vec<DuplicateAlias> {
 ///
 /// Groups are found first, at any place; positions count the SubDevices that belong to no group. If an optional
 /// SubDevice is absent, the following declarations by position are searched one place nearer to the start. Of several
-/// combinations of absent optional SubDevices, that with the fewest errors is taken. Alias 0 counts all SubDevices.
+/// combinations of absent optional SubDevices, that with the fewest errors is taken; with more than
+/// 2^24 an optional one is absent where it does not fit. Alias 0 counts all SubDevices.
 pub fn resolve(configs: &[SubDeviceConfig], infos: &[impl Borrow<SubDeviceInfo>]) -> Vec<Resolution> {
     let infos: Vec<&SubDeviceInfo> = infos.iter().map(Borrow::borrow).collect();
     let infos = &infos[..];
+    let marked = Marked::new(infos);
     let mut resolutions = vec![None; configs.len()];
     for members in groups(configs) {
-        groups::find(configs, &members, infos, &mut resolutions);
+        groups::find(configs, &members, (infos, &marked), &mut resolutions);
     }
-    let grouped =
-        |at: usize| resolutions.iter().any(|r| matches!(r, Some(Resolution::Found { info, .. }) if *info == at));
-    let places = (0..infos.len()).filter(|at| !grouped(*at)).collect();
+    let mut is_grouped = vec![false; infos.len()];
+    for resolution in &resolutions {
+        step();
+        if let Some(Resolution::Found { info, .. }) = *resolution {
+            is_grouped[info] = true;
+        }
+    }
+    let places = (0..infos.len()).filter(|at| !is_grouped[*at]).collect();
     let segment = Segment { infos, places };
     let by_position = by_position(configs);
-    let costs = AbsenceCosts::new(&by_position, configs, &segment);
+    let absences = Absences::new(&by_position, configs, &segment);
     let mut absent = 0;
     for (n, (position, config)) in by_position.iter().enumerate() {
-        let is_absent = configs[*config].optional && costs.better_absent(n, absent);
+        let declared = &configs[*config];
+        let fits = || segment.fits(declared, *position, absent);
+        let is_absent = declared.optional && absences.is_better(n, absent, fits);
         resolutions[*config] = Some(if is_absent {
             absent += 1;
-            Resolution::Absent { config: *config, error: missing_error(&configs[*config], infos) }
+            Resolution::Absent { config: *config, error: missing_error(declared, infos) }
         } else {
             at_place(configs, infos, *config, position.checked_sub(absent).and_then(|place| segment.at(place)))
         });
     }
     for (config, resolution) in resolutions.iter_mut().enumerate().filter(|(_, resolution)| resolution.is_none()) {
-        *resolution = Some(by_mark(configs, infos, config));
+        *resolution = Some(by_mark(configs, infos, &marked, config));
     }
     claim(resolutions.into_iter().flatten().collect(), infos)
 }
@@ -93,6 +106,12 @@ impl Segment<'_> {
     /// Index of the SubDevice at a position.
     fn at(&self, position: usize) -> Option<usize> {
         self.places.get(position).copied()
+    }
+
+    /// Whether a declaration fits its place with this number of absent ones before it.
+    fn fits(&self, config: &SubDeviceConfig, position: usize, absent: usize) -> bool {
+        let info = position.checked_sub(absent).and_then(|place| self.infos.get(self.at(place)?));
+        info.is_some_and(|info| config.expected.mismatch(info).is_none())
     }
 }
 
@@ -111,49 +130,55 @@ fn by_position(configs: &[SubDeviceConfig]) -> Vec<(usize, usize)> {
     found
 }
 
-/// Smallest number of errors from declaration n (of those by position) on, by the number of absent optional SubDevices
-/// before it.
-struct AbsenceCosts {
-    /// Errors if declaration n counts as present, and if it counts as absent.
-    costs: Vec<[u32; 2]>,
-    width: usize,
+/// Whether optional SubDevices are better taken as absent.
+enum Absences {
+    /// By declaration of those by position, and by the number of absent ones before it.
+    Best { is_better: Vec<bool>, width: usize },
+    /// Too many combinations: one that does not fit is absent.
+    Simple,
 }
 
-impl AbsenceCosts {
-    fn new(by_position: &[(usize, usize)], configs: &[SubDeviceConfig], segment: &Segment<'_>) -> AbsenceCosts {
+impl Absences {
+    fn new(by_position: &[(usize, usize)], configs: &[SubDeviceConfig], segment: &Segment<'_>) -> Absences {
         let optional = by_position.iter().filter(|(_, config)| configs[*config].optional).count();
         let width = optional + 1;
-        let mut costs = vec![[0, u32::MAX]; by_position.len() * width];
+        if by_position.len().saturating_mul(width) > MAX_COMBINATIONS {
+            return Absences::Simple;
+        }
+        let mut is_better = vec![false; by_position.len() * width];
+        // The smallest number of errors behind a declaration, by the number of absent ones up to it.
         let mut behind = vec![0u32; width];
         for (n, (position, config)) in by_position.iter().enumerate().rev() {
             let config = &configs[*config];
             let mut here = vec![0u32; width];
             for absent in 0..width {
-                let info = position.checked_sub(absent).and_then(|place| segment.infos.get(segment.at(place)?));
-                let fits = info.is_some_and(|info| config.expected.mismatch(info).is_none());
-                let present_cost = behind[absent].saturating_add(u32::from(!fits));
+                step();
+                let present_cost = behind[absent].saturating_add(u32::from(!segment.fits(config, *position, absent)));
                 let absent_cost = match behind.get(absent + 1) {
                     Some(cost) if config.optional => *cost,
                     _ => u32::MAX,
                 };
-                costs[n * width + absent] = [present_cost, absent_cost];
+                is_better[n * width + absent] = absent_cost < present_cost;
                 here[absent] = present_cost.min(absent_cost);
             }
             behind = here;
         }
-        AbsenceCosts { costs, width }
+        Absences::Best { is_better, width }
     }
 
-    fn better_absent(&self, n: usize, absent: usize) -> bool {
-        let [present_cost, absent_cost] = self.costs[n * self.width + absent];
-        absent_cost < present_cost
+    /// Whether optional declaration n of those by position is better taken as absent.
+    fn is_better(&self, n: usize, absent: usize, fits: impl FnOnce() -> bool) -> bool {
+        match self {
+            Absences::Best { is_better, width } => is_better[n * width + absent],
+            Absences::Simple => !fits(),
+        }
     }
 }
 
 /// Finds a SubDevice by alias or identification, or by its exact position with alias 0.
-fn by_mark(configs: &[SubDeviceConfig], infos: &[&SubDeviceInfo], config: usize) -> Resolution {
+fn by_mark(configs: &[SubDeviceConfig], infos: &[&SubDeviceInfo], marked: &Marked, config: usize) -> Resolution {
     let address = configs[config].address;
-    match find_marked(address, infos) {
+    match marked.find(address, infos) {
         Ok(place) => at_place(configs, infos, config, place.map(|place| place + address.offset())),
         Err(error) => Resolution::Failed { config, error },
     }
@@ -177,4 +202,29 @@ fn claim(mut resolutions: Vec<Resolution>, infos: &[&SubDeviceInfo]) -> Vec<Reso
     let extra = owners.iter().enumerate().filter(|(_, owner)| owner.is_none());
     resolutions.extend(extra.map(|(info, _)| Resolution::Extra { info }));
     resolutions
+}
+
+/// Counts the work in tests: it has to grow as the networks do.
+#[inline]
+pub(super) fn step() {
+    #[cfg(test)]
+    steps::count();
+}
+
+#[cfg(test)]
+pub(super) mod steps {
+    use core::cell::Cell;
+
+    std::thread_local! {
+        static STEPS: Cell<usize> = const { Cell::new(0) };
+    }
+
+    pub fn count() {
+        STEPS.set(STEPS.get() + 1);
+    }
+
+    /// The steps of this thread so far.
+    pub fn so_far() -> usize {
+        STEPS.get()
+    }
 }

@@ -230,3 +230,47 @@ fn an_absent_or_incomplete_group_does_not_move_other_positions() {
     let expected = [found(0, 0), found(1, 2), found(2, 1), Resolution::Absent { config: 3, error }];
     assert_eq!(resolve(&with_group(), &infos), expected);
 }
+
+/// Steps of a resolution of this many SubDevices.
+fn steps(number: u16, declare: impl Fn(u16) -> SubDeviceConfig) -> usize {
+    let mut infos = infos(&vec![10; number.into()]);
+    for (mark, info) in (1..).zip(&mut infos) {
+        (info.alias, info.identification) = (mark, Some(mark));
+    }
+    let configs: Vec<SubDeviceConfig> = (0..number).map(declare).collect();
+    let before = super::resolve::steps::so_far();
+    let resolutions = resolve(&configs, &infos);
+    let all_found = (0..number.into()).map(|at| found(at, at));
+    assert!(resolutions.into_iter().eq(all_found));
+    super::resolve::steps::so_far() - before
+}
+
+// covers: declaration
+#[test]
+fn the_work_of_a_resolution_grows_as_the_network_does() {
+    type Declare = fn(u16) -> SubDeviceConfig;
+    let ways: [(&str, Declare); 4] = [
+        ("positions", |at| config(at, 10)),
+        ("aliases", |at| SubDeviceConfig::at_alias(at + 1, 0)),
+        ("identifications", |at| SubDeviceConfig::at_identification(at + 1)),
+        ("more optional ones than combinations are compared", |at| config(at, 10).optional()),
+    ];
+    for (way, declare) in ways {
+        let (few, many) = (steps(5_000, declare), steps(20_000, declare));
+        assert!(few <= 20_000 && many <= 4 * few + 100, "{way}: {few} steps, {many} for four times as many");
+    }
+}
+
+// covers: declaration
+#[test]
+fn very_many_optional_subdevices_are_absent_where_they_do_not_fit() {
+    let products: Vec<u32> = (0..5_000).collect();
+    let configs: Vec<SubDeviceConfig> = (0..5_000).map(|at| config(at, at.into()).optional()).collect();
+    let without: Vec<u32> = products.iter().copied().filter(|product| *product != 7).collect();
+    let resolutions = resolve(&configs, &infos(&without));
+    assert_eq!(
+        (&resolutions[6], &resolutions[8], &resolutions[4_999]),
+        (&found(6, 6), &found(8, 7), &found(4_999, 4_998))
+    );
+    assert_eq!(resolutions[7], absent(7, 7, 4_999));
+}

@@ -4,7 +4,7 @@
 use ringcat_config::esi::sii::{SiiOptions, SiiProfile, build, code_of};
 use ringcat_config::esi::{Device, Esi, Pdo, PlacedModule, SyncManagerRole, place_modules};
 use ringcat_sim::description::{DeviceDescription, PdoDescription, PdoEntryDescription};
-use ringcat_wire::sii::PdoDirection;
+use ringcat_wire::sii::{Pdo as SiiPdo, PdoDirection};
 
 use super::objects;
 
@@ -37,7 +37,8 @@ pub(super) fn describe(
         description.pdos = of_device(device);
     }
     add_modules(device, &placed, &mut description)?;
-    description.objects = objects::objects(esi, device, &placed, &description.pdos)?;
+    let objects = objects::objects(esi, device, &placed, &description.pdos)?;
+    (description.objects, description.described) = (objects.plain, objects.derived);
     description.controller_fmmus = device.info.fmmu_count.filter(|count| *count > 0);
     Ok(description)
 }
@@ -60,7 +61,7 @@ fn described(device: &Device, pdo: &Pdo, direction: PdoDirection) -> PdoDescript
         index: pdo.index.index,
         name: pdo.name.english().to_owned(),
         sync_manager: pdo.sync_manager.filter(fits),
-        flags: 0,
+        flags: if pdo.is_fixed { SiiPdo::FIXED } else { 0 },
         entries: pdo.entries.iter().flat_map(entry).collect(),
     }
 }

@@ -1,5 +1,5 @@
 //! The object dictionary of a simulated device from a description. PDO mappings, PDO assignments and the identity
-//! follow from the rest of the device; the simulator creates them.
+//! follow from the rest of the device; the simulator creates them, with the names of the description.
 
 use std::collections::BTreeMap;
 
@@ -22,22 +22,27 @@ const DETECTED_IDENTS: u16 = 0xF050;
 /// Bytes of a number.
 const NUMBER: usize = 8;
 
+/// Objects of a description.
+pub(super) struct Objects {
+    /// Those that the simulator takes as they are.
+    pub(super) plain: Vec<Object>,
+    /// Those that it creates, with the names of the description.
+    pub(super) derived: Vec<Object>,
+}
+
 /// The objects of device and modules. The error is that of an object whose values do not fit beside the others.
 pub(super) fn objects(
     esi: &Esi,
     device: &Device,
     placed: &[PlacedModule<'_>],
     pdos: &[PdoDescription],
-) -> Result<Vec<Object>, String> {
+) -> Result<Objects, String> {
     let mut objects: BTreeMap<u16, Object> = BTreeMap::new();
     let mut room = PartsRoom::default();
     let mut add = |dictionary: &Dictionary, object: &EsiObject, (file, kind): (&str, &str)| {
-        let index = object.index.index;
-        if !is_derived(index) {
-            let file = dictionary.file.as_deref().unwrap_or(file);
-            let failed = |problem| EsiError::at_line(file, object.line, kind.trim(), problem).to_string();
-            objects.insert(index, converted(dictionary, object, &mut room).map_err(failed)?);
-        }
+        let file = dictionary.file.as_deref().unwrap_or(file);
+        let failed = |problem| EsiError::at_line(file, object.line, kind.trim(), problem).to_string();
+        objects.insert(object.index.index, converted(dictionary, object, &mut room).map_err(failed)?);
         Ok::<_, String>(())
     };
     for dictionary in device.profiles.iter().filter_map(|profile| profile.dictionary.as_deref()) {
@@ -59,11 +64,16 @@ pub(super) fn objects(
             (CONFIGURED_IDENTS, "Configured module idents", Access::ReadWrite),
             (DETECTED_IDENTS, "Detected module idents", Access::ReadOnly),
         ] {
-            objects.insert(index, idents(index, name, access, placed));
+            let mut idents = idents(index, name, access, placed);
+            if let Some(described) = objects.get(&index) {
+                idents.named_by(described);
+            }
+            objects.insert(index, idents);
         }
     }
     add_mapped(pdos, &mut objects);
-    Ok(objects.into_values().collect())
+    let (derived, plain) = objects.into_values().partition(|object| is_derived(object.index));
+    Ok(Objects { plain, derived })
 }
 
 /// Detected modules by slot; the configured ones are zero until they are written.
@@ -104,7 +114,8 @@ fn entry(part: &Part, is_single: bool) -> Entry {
     ];
     let more = more.into_iter().filter(|(is_set, _)| *is_set).fold(0, |all, (_, bit)| all | bit);
     let code = u8::try_from(part.data_type).unwrap_or(data_type::OCTET_STRING);
-    let made = Entry::new(part.sub_index, code, access, &part.default).allow(more);
+    let bits = u16::try_from(part.bit_size).unwrap_or(0);
+    let made = Entry::new(part.sub_index, code, access, &part.default).of_bits(bits).allow(more);
     let made = if is_single { made } else { made.named(&part.name) };
     match (&part.minimum, &part.maximum) {
         (Some(low), Some(high)) if is_unsigned(code) && low.len() <= NUMBER && part.default.len() < NUMBER => {
@@ -140,6 +151,7 @@ fn add_mapped(pdos: &[PdoDescription], objects: &mut BTreeMap<u16, Object>) {
             }
             let zeros = vec![0; usize::from(mapped.bit_length).div_ceil(8)];
             let entry = Entry::new(mapped.sub_index, mapped.data_type, access, &zeros);
+            let entry = entry.of_bits(mapped.bit_length.into());
             object.entries.push(entry.named(&mapped.name).allow(right));
             object.entries.sort_by_key(|entry| entry.sub_index);
         }

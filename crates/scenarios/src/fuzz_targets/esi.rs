@@ -38,8 +38,8 @@ pub fn is_read(bytes: &[u8]) -> bool {
             let whole = device.eeprom.as_ref().is_some_and(|eeprom| eeprom.data.is_some());
             // An image that the description contains may be anything.
             assert!(whole || Sii::parse(&image.bytes).is_ok());
-            if let Ok(text) = skeleton(&image.bytes) {
-                let again = esi::read("again.xml", text.as_bytes());
+            if let Ok(made) = skeleton(&image.bytes) {
+                let again = esi::read("again.xml", made.text.as_bytes());
                 assert!(whole || again.is_ok(), "{again:?}");
             }
         }

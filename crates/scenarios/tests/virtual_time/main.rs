@@ -34,6 +34,8 @@ mod ended_disturbances;
 mod eni;
 mod esi;
 mod esi_declared;
+mod esi_dictionary;
+mod esi_fixed;
 mod ethernet;
 mod explorer;
 mod failures;

@@ -9,6 +9,7 @@ use ringcat::eni::EniFile;
 use ringcat::network::{LoadedNetwork, NetworkFile, ScanOptions};
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{Declaration, MainDevice, Options, Scan};
+use ringcat_wire::al::{AlState, AlStatus};
 
 use DifferenceKind::{Additional, Cable, Device, Identification, Mailbox, Missing, Order, Pdos, Revision, Serial};
 
@@ -119,6 +120,51 @@ fn a_missing_subdevice_prevents_op_unless_it_is_optional() {
         file.required = Required::All;
     });
     assert_eq!(kinds(&judged(&all, &without)), [(Missing, true)]);
+}
+
+/// The file of a bus with nothing required.
+fn nothing_required(types: &[&str], change: impl FnOnce(&mut NetworkFile)) -> LoadedNetwork {
+    file_of(types, |file| {
+        file.required = Required::Nothing;
+        change(file);
+    })
+}
+
+/// The states on a bus after an activation with nothing required: whether each SubDevice is in OP.
+fn in_op(network: &LoadedNetwork, types: &[&str]) -> Vec<bool> {
+    let (main_device, _) = scanned(types);
+    let mut application = main_device.activate(network.declaration()).expect("nothing is required");
+    // One that is missing stays so.
+    let _ = application.wait_until_op(Duration::from_secs(2));
+    application.links().network().devices().map(|it| it.al_status() == AlStatus::new(AlState::Op)).collect()
+}
+
+/// The engine finds SubDevices at other positions by their identities once it is active.
+// covers: network-file, mandatory
+#[test]
+fn with_nothing_required_no_difference_of_places_prevents_op() {
+    let network = nothing_required(&BUS, |_| ());
+    let (coupler, outputs, analog, servo) = (BUS[0], BUS[1], BUS[2], BUS[3]);
+    for (types, kind, expected) in [
+        (vec![coupler, outputs, analog], Missing, vec![true; 3]),
+        (vec![coupler, analog, servo], Missing, vec![true; 3]),
+        (vec![coupler, analog, servo, outputs], Order, vec![true, true, true, false]),
+        (vec![coupler, "digital-input-8", outputs, analog, servo], Additional, vec![true, false, true, true, true]),
+        (vec![coupler, outputs, analog, servo, "digital-input-8"], Additional, vec![true, true, true, true, false]),
+    ] {
+        let (_, scan) = scanned(&types);
+        let differences = network.configuration.differences(found(&scan), &network.stated());
+        let places: Vec<_> = kinds(&differences).into_iter().filter(|(kind, _)| *kind != Cable).collect();
+        assert_eq!(places, [(kind, false)], "{types:?}: {differences:#?}");
+        assert_eq!(in_op(&network, &types), expected, "{types:?}");
+    }
+    // A SubDevice of another identity is absent; all others are in OP.
+    let own = ["coupler", "digital-output-8 serial=11", "servo"];
+    let compared = nothing_required(&own, |file| file.subdevice[1].serial = Some(12));
+    let (_, scan) = scanned(&own);
+    let differences = compared.configuration.differences(found(&scan), &compared.stated());
+    assert_eq!(kinds(&differences), [(Serial, false)]);
+    assert_eq!(in_op(&compared, &own), [true, false, true]);
 }
 
 // covers: network-file

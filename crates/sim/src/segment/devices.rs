@@ -84,7 +84,7 @@ pub(super) fn describe(
 
 /// Bytes of the objects and files of a device.
 fn size(description: &DeviceDescription) -> usize {
-    let entries = description.objects.iter().flat_map(|object| &object.entries);
+    let entries = description.objects.iter().chain(&description.described).flat_map(|object| &object.entries);
     let files = description.services.foe.files.iter().map(|(_, data)| data.len());
     entries.map(|entry| ENTRY_BYTES + entry.name.len() + entry.value.len()).sum::<usize>() + files.sum::<usize>()
 }

@@ -44,6 +44,8 @@ pub struct Pdo<'a> {
 impl<'a> Pdo<'a> {
     /// Bytes of a PDO without its entries.
     pub const HEADER_LEN: usize = 8;
+    /// Bit of [`Pdo::flags`]: its entries cannot be changed.
+    pub const FIXED: u16 = 0x0010;
 
     /// Its entries in order.
     pub const fn entries(&self) -> PdoEntries<'a> {

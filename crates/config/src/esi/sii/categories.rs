@@ -1,7 +1,7 @@
 //! The categories of an image from a description (protocol ES-82 to ES-100).
 
 use ringcat_wire::sii::{
-    CoeDetails, DcMode, General, GeneralFlags, PdoEntry as SiiEntry, PhysicalPort, SiiSyncManager,
+    CoeDetails, DcMode, General, GeneralFlags, Pdo as SiiPdo, PdoEntry as SiiEntry, PhysicalPort, SiiSyncManager,
     SyncManagerKind as SiiKind,
 };
 
@@ -15,7 +15,6 @@ const NOT_ASSIGNED: u8 = 0xFF;
 /// Flags of a PDO.
 const MANDATORY: u16 = 0x0001;
 const OVERSAMPLING: u16 = 0x0004;
-const FIXED: u16 = 0x0010;
 const VIRTUAL: u16 = 0x0020;
 const BY_SLOT: u16 = 0x0200;
 const BY_GROUP: u16 = 0x0400;
@@ -283,7 +282,7 @@ fn pdo_flags(pdo: &Pdo) -> u16 {
     [
         (pdo.is_mandatory, MANDATORY),
         (pdo.oversampling.is_some(), OVERSAMPLING),
-        (pdo.is_fixed, FIXED),
+        (pdo.is_fixed, SiiPdo::FIXED),
         (pdo.is_virtual, VIRTUAL),
         (pdo.index.by_slot, BY_SLOT),
         (pdo.index.by_group, BY_GROUP),

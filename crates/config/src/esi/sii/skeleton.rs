@@ -4,7 +4,8 @@
 use std::fmt::{self, Write};
 
 use ringcat_wire::sii::{
-    FmmuUsage, General, PdoDirection, PhysicalPort, Sii, SiiError, SiiSyncManager, Strings, SyncManagerKind,
+    FmmuUsage, General, MailboxLayout, MailboxProtocols, Pdo, PdoDirection, PhysicalPort, Sii, SiiError, SiiHeader,
+    SiiSyncManager, Strings, SyncManagerKind,
 };
 
 use super::data_type::name_of;
@@ -12,17 +13,33 @@ use super::data_type::name_of;
 /// A category of the vendor.
 const FIRST_OF_VENDOR: u16 = 1;
 const LAST_OF_VENDOR: u16 = 9;
+/// Protocols that have an element.
+const PROTOCOLS: u16 = MailboxProtocols::AOE
+    | MailboxProtocols::EOE
+    | MailboxProtocols::COE
+    | MailboxProtocols::FOE
+    | MailboxProtocols::SOE
+    | MailboxProtocols::VOE;
 
-/// The text of a description of the device with this image.
+/// A description made of an image.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Skeleton {
+    /// Its text.
+    pub text: String,
+    /// What a description cannot say of the mailboxes of the image.
+    pub notices: Vec<String>,
+}
+
+/// The description of the device with this image.
 ///
 /// # Errors
 /// [`SiiError`]: bytes that are not an SII image.
-pub fn skeleton(image: &[u8]) -> Result<String, SiiError> {
+pub fn skeleton(image: &[u8]) -> Result<Skeleton, SiiError> {
     let sii = Sii::parse(image)?;
     let mut out = Xml { text: String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"), depth: 0 };
     // Writing to a string cannot fail.
     let _ = document(&mut out, &sii, image);
-    Ok(out.text)
+    Ok(Skeleton { text: out.text, notices: unsaid(&sii) })
 }
 
 /// Elements with their indentation.
@@ -211,7 +228,7 @@ fn pdos(out: &mut Xml, sii: &Sii<'_>, direction: PdoDirection) -> fmt::Result {
     for pdo in sii.pdos(direction) {
         let flag = |mask: u16, name: &str| if pdo.flags & mask == 0 { String::new() } else { format!(" {name}=\"1\"") };
         let sm = pdo.sync_manager.map(|number| format!(" Sm=\"{number}\"")).unwrap_or_default();
-        let flags = [flag(0x10, "Fixed"), flag(1, "Mandatory"), flag(0x20, "Virtual")].concat();
+        let flags = [flag(Pdo::FIXED, "Fixed"), flag(1, "Mandatory"), flag(0x20, "Virtual")].concat();
         out.open(format_args!("{name}{flags}{sm}"))?;
         out.leaf("Index", format_args!("#x{:04X}", pdo.index))?;
         out.leaf("Name", text(&strings, pdo.name))?;
@@ -236,11 +253,46 @@ fn pdos(out: &mut Xml, sii: &Sii<'_>, direction: PdoDirection) -> fmt::Result {
     Ok(())
 }
 
+/// Whether the fixed area has mailboxes or protocols: a device may have mailboxes without any protocol.
+fn has_mailbox(sii: &Sii<'_>) -> bool {
+    let header = sii.header();
+    header.protocols.0 != 0 || header.standard_mailbox != MailboxLayout::default()
+}
+
+/// A description has the mailboxes of its SyncManagers, and the protocols that have an element.
+fn unsaid(sii: &Sii<'_>) -> Vec<String> {
+    if !has_mailbox(sii) {
+        return Vec::new();
+    }
+    let SiiHeader { standard_mailbox: own, protocols, .. } = sii.header();
+    let of = |kind: SyncManagerKind| {
+        sii.sync_managers().find(|sm| sm.kind == kind).map_or((0, 0), |sm| (sm.start, sm.length))
+    };
+    let (write, read) = (of(SyncManagerKind::MailboxOut), of(SyncManagerKind::MailboxIn));
+    let mut notices = Vec::new();
+    if (own.receive_offset, own.receive_size) != write || (own.send_offset, own.send_size) != read {
+        let word = |(start, length): (u16, u16)| format!("{start:#06x} ({length} bytes)");
+        let own = [word((own.receive_offset, own.receive_size)), word((own.send_offset, own.send_size))];
+        notices.push(format!(
+            "the mailboxes of the fixed area, {}, are not those of the SyncManagers, {} and {}, which the description \
+             has",
+            own.join(" and "),
+            word(write),
+            word(read)
+        ));
+    }
+    let without_element = protocols.0 & !PROTOCOLS;
+    if without_element != 0 {
+        notices.push(format!("the protocols {without_element:#06x} have no element in a description"));
+    }
+    notices
+}
+
 fn mailbox(out: &mut Xml, sii: &Sii<'_>, general: &General) -> fmt::Result {
-    let protocols = sii.header().protocols;
-    if protocols.0 == 0 {
+    if !has_mailbox(sii) {
         return Ok(());
     }
+    let protocols = sii.header().protocols;
     let link = if general.flags.mailbox_data_link_layer() { " DataLinkLayer=\"true\"" } else { "" };
     out.open(format_args!("Mailbox{link}"))?;
     let mut protocol = |is_there: bool, name: &str| if is_there { out.line(format_args!("<{name}/>")) } else { Ok(()) };

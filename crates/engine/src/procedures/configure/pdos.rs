@@ -55,10 +55,15 @@ impl BringUp<'_> {
     }
 
     /// Whether the dictionary holds what is known of it: it is as at power-on, and no start-up command has written it.
+    /// An SII without any PDO says nothing of it.
     fn is_dictionary_known(&self) -> bool {
         let view = self.segment.view();
-        let source = view.member(self.index).and_then(|member| member.info.map(|info| info.pdo_source));
-        source.is_some_and(PdoSource::is_of_power_on) && !self.mailbox.has_written_pdos()
+        let info = view.member(self.index).and_then(|member| member.info);
+        let is_known = info.is_some_and(|info| match info.pdo_source {
+            PdoSource::Sii => !info.pdos.is_empty(),
+            source => source.is_of_power_on(),
+        });
+        is_known && !self.mailbox.has_written_pdos()
     }
 
     fn refused(&self, sync_manager: u8, error: SdoError) -> Result<(), ConfigureError> {

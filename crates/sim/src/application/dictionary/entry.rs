@@ -44,6 +44,8 @@ pub struct Entry {
     /// Unit for SDO information.
     unit: Option<u16>,
     default: Option<Vec<u8>>,
+    /// Bits of the value, where they are not those of the type or of all its bytes.
+    bits: Option<u16>,
 }
 
 impl Entry {
@@ -62,6 +64,7 @@ impl Entry {
             choices: &[],
             unit: None,
             default,
+            bits: None,
         }
     }
 
@@ -78,6 +81,11 @@ impl Entry {
     /// The same entry with additional access rights: bits of [`AccessRights`].
     pub fn allow(self, rights: u16) -> Entry {
         Entry { more_rights: self.more_rights | rights, ..self }
+    }
+
+    /// The same entry with this number of bits, for example 3 of an enumeration in a byte; 0 is no statement.
+    pub fn of_bits(self, bits: u16) -> Entry {
+        Entry { bits: Some(bits).filter(|bits| *bits != 0), ..self }
     }
 
     /// The same entry as a number that can only be written within this range.
@@ -110,8 +118,8 @@ impl Entry {
         if self.data_type() == DataType::DOMAIN {
             return 0;
         }
-        let bits = u16::try_from(self.value.len() * 8).unwrap_or(0);
-        self.data_type().bits().unwrap_or(bits)
+        let whole = || u16::try_from(self.value.len() * 8).unwrap_or(0);
+        self.bits.or(self.data_type().bits()).unwrap_or_else(whole)
     }
 
     /// Access rights in the format of SDO information.

@@ -74,6 +74,22 @@ impl Object {
         }
     }
 
+    /// Takes over the names that the description of a device has for this object and its entries.
+    pub fn named_by(&mut self, description: &Object) {
+        if !description.name.is_empty() {
+            self.name.clone_from(&description.name);
+        }
+        let is_single = description.entries.len() < 2;
+        for entry in &mut self.entries {
+            match description.entry(entry.sub_index) {
+                Some(described) => entry.name.clone_from(&described.name),
+                // The list of the description is shorter.
+                None if !is_single => entry.name = format!("SubIndex {:03}", entry.sub_index),
+                None => {}
+            }
+        }
+    }
+
     /// Finds an entry.
     pub fn entry(&self, sub_index: u8) -> Option<&Entry> {
         self.entries.iter().find(|entry| entry.sub_index == sub_index)

@@ -1,9 +1,9 @@
 //! Builds the objects of a dictionary from a device description (protocol 6.3, standard objects).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, btree_map};
 
 use ringcat_wire::mailbox::coe::AccessRights;
-use ringcat_wire::sii::{PdoDirection, SyncManagerKind};
+use ringcat_wire::sii::{Pdo, PdoDirection, SiiSyncManager, SyncManagerKind};
 
 use super::entry::{Access, Entry};
 use super::object::{ASSIGNMENT_BASE, MAX_MAPPED_ENTRIES, MappedEntry, Object, ObjectRole};
@@ -19,7 +19,15 @@ pub(super) fn build(description: &DeviceDescription) -> Vec<Object> {
     sync_managers(description).into_iter().for_each(&mut add);
     description.pdos.iter().map(|pdo| mapping(description, pdo)).for_each(&mut add);
     mapped_objects(description).into_iter().for_each(&mut add);
-    description.objects.iter().cloned().for_each(&mut add);
+    for described in &description.described {
+        match objects.entry(described.index) {
+            btree_map::Entry::Occupied(mut derived) => derived.get_mut().named_by(described),
+            btree_map::Entry::Vacant(free) => drop(free.insert(described.clone())),
+        }
+    }
+    for object in &description.objects {
+        objects.insert(object.index, object.clone());
+    }
     objects.into_values().collect()
 }
 
@@ -68,7 +76,8 @@ fn sync_managers(description: &DeviceDescription) -> Vec<Object> {
 }
 
 fn assignment(description: &DeviceDescription, number: u8, direction: PdoDirection) -> Object {
-    let writable = description.mailbox.is_some_and(|mailbox| mailbox.coe_details.pdo_assign());
+    let is_fixed = description.sync_managers[usize::from(number)].enable & SiiSyncManager::FIXED_CONTENT != 0;
+    let writable = !is_fixed && description.mailbox.is_some_and(|mailbox| mailbox.coe_details.pdo_assign());
     let access = if writable { Access::ReadWritePreOp } else { Access::ReadOnly };
     let assigned: Vec<u16> =
         description.default_assignment(number).filter(|pdo| pdo.direction == direction).map(|pdo| pdo.index).collect();
@@ -80,7 +89,8 @@ fn assignment(description: &DeviceDescription, number: u8, direction: PdoDirecti
 }
 
 fn mapping(description: &DeviceDescription, pdo: &PdoDescription) -> Object {
-    let writable = description.mailbox.is_some_and(|mailbox| mailbox.coe_details.pdo_configuration());
+    let is_fixed = pdo.flags & Pdo::FIXED != 0;
+    let writable = !is_fixed && description.mailbox.is_some_and(|mailbox| mailbox.coe_details.pdo_configuration());
     let access = if writable { Access::ReadWritePreOp } else { Access::ReadOnly };
     let slots = if writable { MAX_MAPPED_ENTRIES.max(pdo.entries.len()) } else { pdo.entries.len() };
     let values = pdo.entries.iter().map(|entry| {
@@ -123,7 +133,8 @@ fn mapped_objects(description: &DeviceDescription) -> Vec<Object> {
         };
         for entry in pdo.entries.iter().filter(|entry| entry.index != 0) {
             let zeros = vec![0; usize::from(entry.bit_length).div_ceil(8)];
-            let value = Entry::new(entry.sub_index, entry.data_type, access, &zeros).named(&entry.name).allow(mappable);
+            let value = Entry::new(entry.sub_index, entry.data_type, access, &zeros);
+            let value = value.of_bits(entry.bit_length.into()).named(&entry.name).allow(mappable);
             found.entry(entry.index).or_default().entry(entry.sub_index).or_insert(value);
             // An object of several entries has the name of their PDO.
             let name = if entry.sub_index == 0 { &entry.name } else { &pdo.name };
