@@ -5,9 +5,11 @@
 
 use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
 
+use ringcat_wire::frame::MacAddress;
 use ringcat_wire::master_frame::{Diagnosis, DomainRecord};
 
 use super::sheet::Sheet;
+use crate::link::Link;
 use crate::time::Instant;
 
 /// Room for the knowledge of a segment: some 300 SubDevices with their SIIs. More is not sent.
@@ -45,7 +47,14 @@ pub struct StandbyWords {
     heard_at: AtomicU64,
     /// Its version and the oldest one that could read it, if this MainDevice cannot; 0 otherwise.
     other_version: AtomicU32,
+    /// Address and link of an acyclic frame of another MainDevice that has come since this one is ACTIVE; 0 without.
+    /// Writer: the acyclic half.
+    collision: AtomicU64,
 }
+
+/// Marks a collision, and one on the redundant link.
+const COLLIDED: u64 = 1 << 63;
+const ON_REDUNDANT: u64 = 1 << 62;
 
 impl Default for StandbyWords {
     fn default() -> StandbyWords {
@@ -58,6 +67,7 @@ impl Default for StandbyWords {
             takeover: AtomicU8::new(0),
             heard_at: AtomicU64::new(0),
             other_version: AtomicU32::new(0),
+            collision: AtomicU64::new(0),
         }
     }
 }
@@ -92,6 +102,23 @@ impl StandbyWords {
     pub fn heard_at(&self) -> Option<Instant> {
         let at = self.heard_at.load(Ordering::Relaxed);
         (at != 0).then_some(Instant(at))
+    }
+
+    /// Posts that an acyclic frame of another MainDevice has come while this one is ACTIVE.
+    pub fn post_collision(&self, arrived_on: Link, MacAddress([a, b, c, d, e, f]): MacAddress) {
+        let link = if arrived_on == Link::Redundant { ON_REDUNDANT } else { 0 };
+        self.collision.store(COLLIDED | link | u64::from_be_bytes([0, 0, a, b, c, d, e, f]), Ordering::Relaxed);
+    }
+
+    /// Takes it.
+    pub fn take_collision(&self) -> Option<(Link, MacAddress)> {
+        if self.collision.load(Ordering::Relaxed) == 0 {
+            return None;
+        }
+        let word = self.collision.swap(0, Ordering::Relaxed);
+        let [_, _, a, b, c, d, e, f] = word.to_be_bytes();
+        let link = if word & ON_REDUNDANT == 0 { Link::Main } else { Link::Redundant };
+        Some((link, MacAddress([a, b, c, d, e, f])))
     }
 
     /// Posts that the other MainDevice has a version that cannot be read.

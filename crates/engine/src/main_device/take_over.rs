@@ -68,16 +68,20 @@ impl MainDevice {
         }
     }
 
-    /// A frame of another MainDevice has come while this one is ACTIVE without an application: a collision (protocol
-    /// MR-10), reported once for frames that follow each other.
+    /// A frame of another MainDevice has come while this one is ACTIVE: a collision (protocol MR-10). Without an
+    /// application it is reported once for frames that follow each other; with one the cyclic half does that.
     pub(super) fn note_foreign(&mut self, arrived_on: Link, bytes: &[u8], now: Instant) {
-        if self.role() != MainDeviceRole::Active || self.active().is_some() {
+        if self.role() != MainDeviceRole::Active {
             return;
         }
+        let has_application = self.active().is_some();
         let (Some(standby), Some(source)) = (&mut self.standby, bytes.get(6..).and_then(<[u8]>::first_chunk)) else {
             return;
         };
         let source = MacAddress(*source);
+        if has_application {
+            return standby.words.post_collision(arrived_on, source);
+        }
         let last = standby.collision.replace(Collision { at: now, source: Some(source) });
         if last.is_none_or(|last| now.since(last.at) > COLLISIONS_APART) {
             let event = Event::Standby(StandbyEvent::Collision { arrived_on, source });

@@ -297,11 +297,12 @@ fn seeds_0_to_20_hold_under_faults_of_both_maindevices_and_the_cables() {
 }
 
 /// An ACTIVE that went through INIT although no other one was heard since (1, 2); two that scanned at the same time
-/// for ever (131); no more rounds of reads after a role that ended during one (826).
+/// for ever (131); no more rounds of reads after a role that ended during one (826); a takeover while the other one
+/// scans, which did not yield (1307).
 // covers: standby, MR-10, MR-16
 #[test]
 fn seeds_that_found_faults_hold() {
-    run_all([1, 2, 131, 826]);
+    run_all([1, 2, 131, 826, 1307]);
 }
 
 // covers: standby

@@ -90,11 +90,23 @@ impl Exchange {
     /// A frame of another MainDevice has come: as ACTIVE a collision (protocol MR-10), reported once for frames that
     /// follow each other.
     pub(in crate::exchange) fn note_foreign(&mut self, arrived_on: Link, bytes: &[u8]) {
+        if let Some(source) = bytes.get(6..).and_then(<[u8]>::first_chunk) {
+            self.note_collision(arrived_on, MacAddress(*source));
+        }
+    }
+
+    /// As [`Exchange::note_foreign`], of the frames that the acyclic half has received.
+    pub(super) fn note_acyclic_collision(&mut self) {
+        let Some(state) = self.standby.0.as_deref() else { return };
+        if let Some((arrived_on, source)) = state.words.take_collision() {
+            self.note_collision(arrived_on, source);
+        }
+    }
+
+    fn note_collision(&mut self, arrived_on: Link, source: MacAddress) {
         let now = self.cycle + 1;
         let Some(state) = self.standby.0.as_deref_mut().filter(|it| it.role == MainDeviceRole::Active) else { return };
         let last = core::mem::replace(&mut state.foreign_in, now);
-        let Some(source) = bytes.get(6..).and_then(<[u8]>::first_chunk) else { return };
-        let source = MacAddress(*source);
         state.collided_with = Some(source);
         if last == 0 || now - last > APART {
             self.events.push(CyclicStandbyEvent::Collision { arrived_on, source }.pack());

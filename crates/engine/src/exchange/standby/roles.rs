@@ -33,6 +33,7 @@ impl Exchange {
 
     #[inline(never)]
     fn begin_role_of_two(&mut self, now: Instant) -> Option<MainDeviceRole> {
+        self.note_acyclic_collision();
         let state = self.standby.0.as_deref_mut()?;
         let request = if state.control.is_requested() { state.control.take_request() } else { None };
         let change = match state.role {
