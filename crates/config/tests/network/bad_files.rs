@@ -149,6 +149,17 @@ const CHANGES: &[(&str, &str, &str)] = &[
 
 // covers: network-file
 #[test]
+    (
+        "passage = { processing_ns = 300, forwarding_ns = 10 }",
+        "passage = [300, 10]",
+        "subdevice[1].passage: expected a table, got an array",
+    ),
+    (
+        "{ index = 0x6041, bits = 16 }",
+        "[0x6041, 0, 16]",
+        "subdevice[1].sync_manager[1].pdo[0].entries[0]: expected a table, got an array",
+    ),
+    ("data = \"e8 03\"", "data = \"e8 0 3\"", "subdevice[1].startup[0].sdo.data: expected pairs of hexadecimal digits"),
 fn errors_name_line_key_subdevice_and_what_was_expected() {
     for (from, to, expected) in CHANGES.iter().copied() {
         let error = changed(from, to);
