@@ -423,6 +423,7 @@ fn startup(out: &mut Text, of: &Startup) {
     out.table("[[subdevice.startup]]");
     out.word("at", of.at, At::default(), transition);
     let bytes = |bytes: &Bytes| format!("\"{bytes}\"");
+    out.flag("after_pdos", of.after_pdos);
     let mut inline = |key: &str, pairs: Vec<Option<String>>| {
         let pairs: Vec<String> = pairs.into_iter().flatten().collect();
         out.number(key, format_args!("{{ {} }}", pairs.join(", ")));

@@ -84,6 +84,8 @@ fn every_key_is_in_the_declaration() {
     assert_eq!(drive.startup[13].action, StartupAction::FileWrite(gains));
     assert_eq!(drive.startup[14].action, StartupAction::FileRead(FileRead::new("log.txt")));
     assert!(matches!(&drive.startup[1].action, StartupAction::Sdo(sdo) if sdo.complete_access));
+    let after: Vec<usize> = (0..15).filter(|number| drive.startup[*number].is_after_pdos()).collect();
+    assert_eq!(after, [14]);
     assert_eq!(drive.startup[0].comment.as_deref(), Some("ramp of \\ 1 s"));
     let members: Vec<Vec<(usize, Option<Vec<u8>>)>> = declaration
         .domains
