@@ -228,6 +228,7 @@ fn pdo(of: &esi::Pdo, language: u32) -> Pdo {
     Pdo {
         index: of.index.index,
         name: printable(of.name.in_language(language)),
+        fixed: of.is_fixed,
         entries: Some(
             of.entries.iter().filter(|entry| entry.bit_length > 0).flat_map(|of| entry(of, language)).collect(),
         ),

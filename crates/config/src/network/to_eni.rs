@@ -134,7 +134,7 @@ fn declared(
             model::Direction::Outputs => SyncManagerRole::Outputs,
             model::Direction::Inputs => SyncManagerRole::Inputs,
         };
-        let pdos = it.pdo.iter().map(super::declare::mapping).collect();
+        let pdos = it.pdo.iter().map(|pdo| super::declare::mapping(pdo).with_fixed(false)).collect();
         let one = buffer(it.number, role, Buffer { start, length }, control);
         found.push(one.with_op_only(it.op_only).with_pdos(pdos));
     }

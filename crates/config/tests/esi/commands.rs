@@ -14,6 +14,7 @@ use crate::reading::acme_of;
 
 /// Two PDOs of one and four bits in one SyncManager.
 const OUTPUTS: &str = include_str!("../files/outputs.xml");
+const ANALOG: usize = 2;
 const DRIVE: usize = 3;
 const CYCLE: Duration = Duration::from_millis(1);
 /// The mailbox of the drive.
@@ -150,6 +151,24 @@ fn modules_are_before_the_pdos_and_start_up_commands_behind_them() {
     let (file, _) = network(&with_commands(&(command("#x2000") + &command("#x1C12")), ""), DRIVE);
     assert_eq!(declared(&file), [(0xF030, false), (0x2000, false), (0x1C12, false), (0x6060, false)]);
     assert_eq!(exported(&file), [0xF030, 0x2000, 0x1C12, 0x6060]);
+}
+
+// covers: esi-declare, ES-47, ES-125, eni-run
+#[test]
+fn the_mapping_of_a_fixed_pdo_is_not_written() {
+    let text = |fixed: &str| {
+        let text = ACME.replace("CoE SdoInfo=\"true\" PdoAssign=\"true\"", "CoE PdoAssign=\"1\" PdoConfig=\"1\"");
+        text.replace(
+            "<TxPdo Fixed=\"1\" Mandatory=\"1\" Sm=\"3\">",
+            &format!("<TxPdo{fixed} Mandatory=\"1\" Sm=\"3\">"),
+        )
+    };
+    let (file, _) = network(&text(" Fixed=\"1\""), ANALOG);
+    let fixed: Vec<(u16, bool)> = file.subdevice[0].sync_manager[1].pdo.iter().map(|it| (it.index, it.fixed)).collect();
+    assert_eq!(fixed, [(0x1A00, true), (0x1A02, true)]);
+    assert_eq!(exported(&file), [0x1C13, 0x8000]);
+    let (file, _) = network(&text(""), ANALOG);
+    assert_eq!(exported(&file), [0x1C13, 0x1A02, 0x1C13, 0x8000]);
 }
 
 // covers: eni-run, ES-125

@@ -58,7 +58,7 @@ fn commands(startup: &[StartupCommand], of: &SubDevice) -> Vec<StartupCommand> {
         }
         // The mapping of an assigned PDO cannot be changed.
         if mailbox.pdo_assign && mailbox.pdo_config {
-            it.pdo.iter().for_each(|pdo| map(pdo, &mut commands));
+            it.pdo.iter().filter(|pdo| !pdo.fixed).for_each(|pdo| map(pdo, &mut commands));
         }
         if mailbox.pdo_assign {
             for (sub, pdo) in (1..=u8::MAX).zip(&it.pdo) {
