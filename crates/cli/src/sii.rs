@@ -190,7 +190,15 @@ fn compared(arguments: &CompareArguments) -> Result<Report, Failure> {
         different,
         images.len() - same - different
     );
-    let verdict = if different == 0 { Verdict::Held(words) } else { Verdict::Failed(words) };
+    let invalid = images.iter().find(|image| image.outcome == "invalid");
+    let verdict = match invalid {
+        Some(image) => {
+            let reason = image.reason.as_deref().unwrap_or_default();
+            Verdict::Failed(format!("{words}; {} is invalid: {reason}", image.file))
+        }
+        None if different == 0 => Verdict::Held(words),
+        None => Verdict::Failed(words),
+    };
     Ok(Report { verdict, data: Data::SiiCompared(SiiCompared { images }) })
 }
 

@@ -327,6 +327,14 @@ fn images_are_built_compared_and_described_again() {
     assert!(differs.code == Some(1) && differs.out.contains("string"), "{}", differs.all());
     let skeleton = ringcat(&["sii", "skeleton", &image, "--out", &place.path("again.xml")]);
     assert!(skeleton.code == Some(0) && place.read("again.xml").contains("ProductCode"), "{}", skeleton.all());
+    let bytes = fs::read(&image).expect("it is there");
+    let wrong = place.path("wrong.bin");
+    for (bad, reason) in [(vec![], "got 0"), ([&[bytes[0] ^ 1], &bytes[1..]].concat(), "checksum")] {
+        fs::write(&wrong, bad).expect("it is ours");
+        let invalid = ringcat(&["sii", "compare", &wrong, &image, "--esi", &acme]);
+        let is_said = invalid.verdict().contains("wrong.bin is invalid: ") && invalid.verdict().contains(reason);
+        assert!(invalid.code == Some(1) && is_said, "{}", invalid.all());
+    }
     let unknown = ringcat(&["sii", "build", &acme, "--type", "AD09", "--out", &image]);
     assert!(
         unknown.code == Some(2) && unknown.all().contains("there is no such device: type \"AD09\""),
