@@ -2,13 +2,13 @@
 //! images. No interface is needed.
 
 use std::fs;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
 use ringcat::config::esi::Esi;
 use ringcat::config::esi::sii::{Comparison, Likeness, SiiOptions, SiiProfile, Skeleton, build, most_alike, skeleton};
 use ringcat::esi::{EsiFailure, load};
+use ringcat::regular_file::read_at_most;
 use ringcat::wire::sii::{Sii, SiiHeader};
 
 use crate::esi::device::{DeviceArguments, read};
@@ -165,9 +165,8 @@ fn descriptions(path: &Path) -> Result<Vec<Esi>, Failure> {
 /// The bytes of an image. The limit applies to what is read: a device reports no length.
 fn image_of(path: &Path) -> Result<Vec<u8>, Failure> {
     const LIMIT: usize = SiiHeader::MAX_EEPROM_BYTES;
-    let mut bytes = Vec::new();
-    let read = fs::File::open(path).and_then(|file| file.take(LIMIT as u64 + 1).read_to_end(&mut bytes));
-    read.map_err(|error| Failure::new(format!("{} cannot be read: {error}", path.display())))?;
+    let read = read_at_most(path, LIMIT as u64 + 1);
+    let bytes = read.map_err(|error| Failure::new(format!("{} cannot be read: {error}", path.display())))?;
     match bytes.len() > LIMIT {
         true => Err(Failure::new(format!("{} is longer than {LIMIT} bytes, the largest EEPROM", path.display()))),
         false => Ok(bytes),
@@ -191,7 +190,15 @@ fn compared(arguments: &CompareArguments) -> Result<Report, Failure> {
         different,
         images.len() - same - different
     );
-    let verdict = if different == 0 { Verdict::Held(words) } else { Verdict::Failed(words) };
+    let invalid = images.iter().find(|image| image.outcome == "invalid");
+    let verdict = match invalid {
+        Some(image) => {
+            let reason = image.reason.as_deref().unwrap_or_default();
+            Verdict::Failed(format!("{words}; {} is invalid: {reason}", image.file))
+        }
+        None if different == 0 => Verdict::Held(words),
+        None => Verdict::Failed(words),
+    };
     Ok(Report { verdict, data: Data::SiiCompared(SiiCompared { images }) })
 }
 

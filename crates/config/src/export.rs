@@ -27,6 +27,7 @@ mod whole_bus;
 pub use details::{ExportDetails, SubDeviceDetails};
 pub use error::{ExportError, LeftOut};
 pub use options::{ExportOptions, LrwUse};
+pub(crate) use order::is_expressible;
 
 use crate::configuration::Configuration;
 use crate::eni::{self, Eni};

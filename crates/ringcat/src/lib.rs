@@ -111,6 +111,8 @@ pub mod piped;
 mod probe;
 mod process_data;
 mod readiness;
+#[cfg(any(feature = "eni", feature = "esi"))]
+pub mod regular_file;
 pub mod services;
 #[cfg(feature = "sim")]
 pub mod shared_segment;

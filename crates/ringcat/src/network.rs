@@ -34,13 +34,14 @@
 mod simulated;
 
 use std::fmt;
-use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use ringcat_config::network::{MAX_NETWORK_BYTES, NetworkError};
 use ringcat_config::{Configuration, Stated};
 use ringcat_engine::main_device::Declaration;
+
+use crate::regular_file::read_at_most;
 
 pub use ringcat_config::network::{Digest, NetworkFile, ScanOptions};
 #[cfg(feature = "sim")]
@@ -95,14 +96,9 @@ impl LoadedNetwork {
     /// # Errors
     /// [`NetworkFailure`]: with file, line and key where something in it is wrong.
     pub fn load(path: &Path) -> Result<LoadedNetwork, NetworkFailure> {
-        // The limit applies to the bytes that are read too: a device or a pipe reports no length.
-        let mut bytes = Vec::new();
-        let read = File::open(path).and_then(|file| {
-            let length = file.metadata()?.len();
-            file.take(MAX_NETWORK_BYTES as u64 + 1).read_to_end(&mut bytes)?;
-            Ok(length)
-        });
-        let length = read.map_err(|error| NetworkFailure::Read { path: path.to_owned(), error })?;
+        let failed = |error| NetworkFailure::Read { path: path.to_owned(), error };
+        let bytes = read_at_most(path, MAX_NETWORK_BYTES as u64 + 1).map_err(failed)?;
+        let length = std::fs::metadata(path).map_err(failed)?.len();
         let name = path.display().to_string();
         if bytes.len() > MAX_NETWORK_BYTES && length > MAX_NETWORK_BYTES as u64 {
             return Err(NetworkFailure::Content(Box::new(NetworkError::too_long(&name, length))));

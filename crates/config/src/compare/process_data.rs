@@ -41,7 +41,11 @@ pub(super) fn unfit(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> BTreeMa
                 .iter()
                 .map(|pdo| (pdo.index, pdo.entries.iter().map(|entry| u32::from(entry.bit_length)).sum()))
                 .collect();
-            held_bytes(&wanted, info, number, fixed)
+            let is_fixed = |pdo: u16| {
+                let mut pdos = of_file(number).into_iter().flat_map(|it| &it.pdos);
+                pdos.any(|it| it.index == pdo && it.fixed)
+            };
+            held_bytes(&wanted, info, (number, fixed), is_fixed)
         } else {
             fixed
         };
@@ -53,14 +57,20 @@ pub(super) fn unfit(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> BTreeMa
 }
 
 /// The length with the PDOs and mappings that a SubDevice with CoE permits; `None` where it is not known.
-fn held_bytes(wanted: &[(u16, u32)], info: &SubDeviceInfo, sync_manager: u8, fixed: Option<u16>) -> Option<u16> {
+fn held_bytes(
+    wanted: &[(u16, u32)],
+    info: &SubDeviceInfo,
+    (sync_manager, fixed): (u8, Option<u16>),
+    is_fixed: impl Fn(u16) -> bool,
+) -> Option<u16> {
     // An SII without CoE details contains no information about them.
     let (can_assign, can_map) = match info.coe {
         details if details.0 == 0 => (true, true),
         details => (details.pdo_assign(), details.pdo_configuration()),
     };
     let mapped = |index: u16| {
-        let of_file = wanted.iter().find(|(pdo, _)| can_map && *pdo == index).map(|(_, bits)| *bits);
+        let of_file =
+            wanted.iter().find(|(pdo, _)| can_map && *pdo == index && !is_fixed(index)).map(|(_, bits)| *bits);
         of_file.or_else(|| info.pdo(index).map(|pdo| pdo.bit_length()))
     };
     let assigned: Vec<u16> = if can_assign {

@@ -124,6 +124,14 @@ impl<'a> Element<'a> {
         }
     }
 
+    /// The 32 bits of an id in a child; old tools write those above 2^31 as negative numbers (protocol ES-113).
+    pub fn id_of(&self, name: &str) -> Result<Option<u32>, EniError> {
+        match self.child(name).and_then(|child| number(&child.text())) {
+            Some(value) if value < 0 && i32::try_from(value).is_ok() => Ok(Some(value as u32)),
+            _ => self.number_of(name),
+        }
+    }
+
     /// The number in a required child.
     pub fn required_number<T: TryFrom<i64> + Bound>(&self, name: &'static str) -> Result<T, EniError> {
         self.required(name)?.number()

@@ -55,16 +55,8 @@ fn mode<'a>(
     let rule = |line, reason: String| EsiError::rule(&esi.file, line, device.kind.trim(), reason);
     let modes = device.clock.as_ref().map(|clock| &clock.modes[..]).unwrap_or_default();
     let line = device.clock.as_ref().map_or(device.line, |clock| clock.line);
-    let names = || {
-        let names: Vec<String> = modes.iter().map(|mode| format!("\"{}\"", mode.name.trim())).collect();
-        if names.is_empty() { "it has none".to_owned() } else { format!("expected {}", names.join(", ")) }
-    };
-    let by_name = |name: &str| {
-        let found = modes.iter().find(|mode| mode.name.trim() == name.trim());
-        found.ok_or_else(|| rule(line, format!("there is no operation mode \"{}\": {}", name.escape_debug(), names())))
-    };
-    if let Some(name) = wanted {
-        return by_name(name).map(Some);
+    if let Some(wanted) = wanted {
+        return chosen(modes, wanted).map(Some).map_err(|reason| rule(line, reason));
     }
     let of_modules = modules.iter().filter_map(|placed| Some((placed, placed.module.op_mode.as_deref()?)));
     let mut of_modules = of_modules.filter(|(_, name)| !name.is_empty());
@@ -77,5 +69,42 @@ fn mode<'a>(
         );
         return Err(rule(line, reason));
     }
-    by_name(name).map(Some)
+    let found = modes.iter().find(|mode| mode.name.trim() == name.trim());
+    let found = found.ok_or_else(|| rule(line, no_mode(modes, name)))?;
+    Ok(Some(found))
+}
+
+/// The mode with a name, else with a description, else with a number as in "#3". Names repeat in real files.
+fn chosen<'a>(modes: &'a [OpMode], wanted: &str) -> Result<&'a OpMode, String> {
+    let of = |text: fn(&OpMode) -> &str| -> Vec<(usize, &'a OpMode)> {
+        (1..).zip(modes).filter(|(_, mode)| text(mode).trim() == wanted.trim()).collect()
+    };
+    let number = wanted.trim().strip_prefix('#').and_then(|number| number.parse::<usize>().ok());
+    let lists = [of(|mode| &mode.name), of(|mode| &mode.description)];
+    match lists.iter().find(|list| !list.is_empty()).map(|list| &list[..]) {
+        Some([(_, mode)]) => Ok(mode),
+        Some(several) => Err(format!(
+            "several operation modes are \"{}\": choose one by its description or its number: {}",
+            wanted.trim().escape_debug(),
+            listed(several)
+        )),
+        None => number.and_then(|number| modes.get(number.checked_sub(1)?)).ok_or_else(|| no_mode(modes, wanted)),
+    }
+}
+
+fn no_mode(modes: &[OpMode], wanted: &str) -> String {
+    let all: Vec<(usize, &OpMode)> = (1..).zip(modes).collect();
+    let known = if all.is_empty() { "it has none".to_owned() } else { format!("expected {}", listed(&all)) };
+    format!("there is no operation mode \"{}\": {known}", wanted.escape_debug())
+}
+
+/// Number, name and description of each.
+fn listed(modes: &[(usize, &OpMode)]) -> String {
+    let shown = |(number, mode): &(usize, &OpMode)| {
+        let (name, description) = (mode.name.trim().escape_debug(), mode.description.trim());
+        let description =
+            if description.is_empty() { String::new() } else { format!(" ({})", description.escape_debug()) };
+        format!("#{number} \"{name}\"{description}")
+    };
+    modes.iter().map(shown).collect::<Vec<_>>().join(", ")
 }

@@ -57,6 +57,8 @@ pub struct SelectedCommand {
     pub message: SelectedMessage,
     /// Its purpose.
     pub comment: String,
+    /// It is sent before the PDOs of the same transition are written (protocol ES-125).
+    pub before_pdos: bool,
 }
 
 /// The message of a start-up command.

@@ -3,7 +3,7 @@
 
 use std::collections::HashSet;
 
-use ringcat_engine::config::{StateTimeout, SubDeviceConfig};
+use ringcat_engine::config::{StartupCommand, StateTimeout, SubDeviceConfig};
 use ringcat_engine::info::Direction;
 use ringcat_wire::al::AlState;
 
@@ -37,7 +37,10 @@ pub(super) fn explicit(configuration: &Configuration, lrw: &Lrw, left_out: &mut 
     for config in &mut whole.declaration.subdevices {
         limits(config);
         signals(config);
+        // An ENI has the commands in the order in which they are sent.
+        config.startup.sort_by_key(StartupCommand::is_after_pdos);
         for command in &mut config.startup {
+            command.after_pdos = false;
             command.comment = command.comment.take().map(|text| one_line(&text)).filter(|text| !text.is_empty());
         }
     }

@@ -63,7 +63,8 @@ pub(super) fn complete(
     }
     out.raw(config, EngineTransition::Ii);
     let (mailboxes, data): (Vec<_>, Vec<_>) = declared.iter().partition(|it| it.role.direction().is_none());
-    out.begin_in_init(config, !mailboxes.is_empty());
+    let has_mailbox = !mailboxes.is_empty();
+    out.begin_in_init(config, has_mailbox);
     out.begin(config);
     let ways: &[Transition] =
         if config.declared_bootstrap.is_some() { &[Ip, Ib, Pi, Si, Oi, Bi] } else { &[Ip, Ib, Pi, Si, Oi] };
@@ -73,15 +74,23 @@ pub(super) fn complete(
         both.iter().for_each(|it| out.sync_manager(Ib, it.index, &it.register));
     }
     out.raw(config, EngineTransition::Ib);
+    if config.declared_bootstrap.is_some() {
+        out.write(&[Ib], "assign EEPROM to PDI", map::SII_CONFIGURATION, vec![1]);
+        out.write(&[Bi], "assign EEPROM back to ECAT", map::SII_CONFIGURATION, vec![0]);
+    }
     out.state(config, &[Ib], AlState::Boot);
     if config.sync.is_some() {
         out.write(&[Ip], "clear DC activation", map::DC_CYCLIC_UNIT_CONTROL, vec![0; 2]);
     }
     out.raw(config, EngineTransition::Ip);
-    if config.sii_to_pdi {
+    // An application reads it while it starts (protocol ES-116), as in a bring-up of the engine.
+    if has_mailbox || config.sii_to_pdi {
         out.write(&[Ip], "assign EEPROM to PDI", map::SII_CONFIGURATION, vec![1]);
     }
     out.state(config, &[Ip], AlState::PreOp);
+    if has_mailbox && !config.sii_to_pdi {
+        out.write(&[Ip], "assign EEPROM back to ECAT", map::SII_CONFIGURATION, vec![0]);
+    }
     out.process_data(config, &data, fmmus);
     out.raw(config, EngineTransition::Pp);
     out.raw(config, EngineTransition::Ps);

@@ -36,6 +36,11 @@ pub(super) const fn section(action: &StartupAction) -> Option<Section> {
     }
 }
 
+/// Whether an ENI can have these commands in their order.
+pub(crate) fn is_expressible(commands: &[StartupCommand]) -> bool {
+    order(commands).is_some()
+}
+
 /// An order of the sections in which the commands of each transition are sent in the same order as these: the registers
 /// behind the mailbox, as in the schema, or before it.
 pub(super) fn order(commands: &[StartupCommand]) -> Option<Order> {

@@ -364,6 +364,9 @@ fn command(startup: &Startup) -> Checked {
     if startup.at == At::Ii && startup.write.is_none() && startup.check.is_none() {
         return fault(["at".into()], "II is in INIT, which has no mailbox: expected write or check".to_owned());
     }
+    if startup.after_pdos && startup.at != At::Ps {
+        return fault(["after_pdos".into()], "PDOs are written at PS: expected no `at`, or \"PS\"");
+    }
     messages(startup)?;
     files(startup)?;
     complete(startup)?;

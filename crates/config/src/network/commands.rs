@@ -29,7 +29,8 @@ pub(super) fn command(of: &model::Startup) -> Option<StartupCommand> {
         At::Bi => Transition::Bi,
     };
     let command = StartupCommand::new(transition, action(of)?);
-    Some(command.with_limit(of.limit.map(|limit| limit.0)).with_comment(of.comment.clone()))
+    let command = command.with_limit(of.limit.map(|limit| limit.0)).with_comment(of.comment.clone());
+    Some(command.with_after_pdos(of.after_pdos))
 }
 
 fn action(of: &model::Startup) -> Option<StartupAction> {

@@ -316,13 +316,14 @@ fn assignment(of: &SyncManager) -> PdoAssignment {
 }
 
 pub(super) fn mapping(pdo: &model::Pdo) -> PdoMapping {
-    match &pdo.entries {
+    let mapping = match &pdo.entries {
         None => PdoMapping::from_sii(pdo.index),
         Some(entries) => {
             let entries = entries.iter().map(|entry| PdoEntry::new(entry.index, entry.sub, entry.bits));
             PdoMapping::of(pdo.index, entries.collect::<Vec<_>>())
         }
-    }
+    };
+    mapping.with_fixed(pdo.fixed)
 }
 
 impl From<SyncSignals> for model::Sync {

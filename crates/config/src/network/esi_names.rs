@@ -2,14 +2,14 @@
 //! device whose PDOs are in its dictionary only, or of a small one, has no texts (protocol ES-47, ES-72, ES-73).
 
 use super::from_esi::printable;
-use super::model::{Entry, SubDevice};
+use super::model::{Entry, Pdo, SubDevice};
 use crate::esi::sii::name_of;
 use crate::esi::{self, Device, Dictionary, Object, PartsRoom, PlacedModule, parts};
 
 impl SubDevice {
     /// Fills in the names and types of PDOs and entries that it does not have, in `language`, an LcId: those of the PDO
     /// in the description or in a module, else those of the object in its dictionary. `modules` are those in the slots
-    /// of the device ([`esi::detected_modules`]). Returns how many names were filled in.
+    /// of the device ([`esi::detected_modules`]). A PDO with the entries of a description that fixes them is fixed. Returns how many names were filled in.
     pub fn name_from_esi(&mut self, device: &Device, modules: &[PlacedModule<'_>], language: u32) -> usize {
         let of_modules: Vec<(esi::Pdo, String)> = modules.iter().flat_map(|placed| pdos_of(placed, language)).collect();
         let mut named = 0;
@@ -21,12 +21,21 @@ impl SubDevice {
                 None => (of_device, of_device.map(|described| described.name.in_language(language))),
             };
             named += usize::from(fill(&mut pdo.name, name));
+            pdo.fixed |= described.is_some_and(|described| described.is_fixed && is_mapped_so(described, pdo));
             for entry in pdo.entries.iter_mut().flatten().filter(|entry| entry.index != 0) {
                 named += usize::from(of_entry(entry, described, (device, modules), language));
             }
         }
         named
     }
+}
+
+/// Whether a PDO of a file has the entries of the description.
+fn is_mapped_so(described: &esi::Pdo, pdo: &Pdo) -> bool {
+    let of_esi = described.entries.iter().filter(|it| it.bit_length > 0);
+    let of_esi = of_esi.map(|it| (it.index.index, if it.index.index == 0 { 0 } else { it.sub_index }, it.bit_length));
+    let of_file = pdo.entries.iter().flatten().map(|it| (it.index, it.sub, u16::from(it.bits)));
+    pdo.entries.is_some() && of_esi.eq(of_file)
 }
 
 /// The PDOs of a module in its slot, with their names.

@@ -228,6 +228,7 @@ fn pdo(of: &esi::Pdo, language: u32) -> Pdo {
     Pdo {
         index: of.index.index,
         name: printable(of.name.in_language(language)),
+        fixed: of.is_fixed,
         entries: Some(
             of.entries.iter().filter(|entry| entry.bit_length > 0).flat_map(|of| entry(of, language)).collect(),
         ),
@@ -340,7 +341,8 @@ fn startup(of: &SelectedCommand, from: &mut Notes) -> Option<Startup> {
         }
     };
     let comment = Some(printable(&of.comment)).filter(|comment| !comment.is_empty());
-    let mut startup = Startup { at, comment, ..Startup::default() };
+    let after_pdos = at == At::Ps && !of.before_pdos;
+    let mut startup = Startup { at, after_pdos, comment, ..Startup::default() };
     match &of.message {
         SelectedMessage::Sdo(_, _, _, data) | SelectedMessage::Idn(_, _, data) if data.is_empty() => {
             from.note(format!("InitCmd \"{}\" without Data: not sent", of.comment));

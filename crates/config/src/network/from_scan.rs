@@ -217,6 +217,7 @@ fn of_pdo(described: Option<&PdoInfo>, pdo: &MappedPdo) -> Pdo {
     Pdo {
         index: pdo.index,
         name: described.map(|described| printable(&described.name)).unwrap_or_default(),
+        fixed: false,
         // The format has no entries without bits: such a mapping is left to the SII.
         entries: Some(entries).filter(|entries| entries.iter().all(|entry| entry.bits > 0)),
     }

@@ -395,6 +395,9 @@ pub struct Pdo {
     /// Its name; variables begin with it.
     #[serde(default)]
     pub name: String,
+    /// The device does not permit other entries: its mapping is never written.
+    #[serde(default)]
+    pub fixed: bool,
     /// Its entries in order; those of the EEPROM if the key is missing.
     pub entries: Option<Vec<Entry>>,
 }

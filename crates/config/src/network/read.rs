@@ -49,6 +49,7 @@ impl NetworkFile {
                 ..failed(None, in_plain_words(error.message()))
             }
         })?;
+        tables(root, &mut Vec::new()).map_err(|fault| placed(name, text, root, &fault))?;
         check(&file).map_err(|fault| placed(name, text, root, &fault))?;
         Ok(file)
     }
@@ -94,6 +95,37 @@ fn version(root: &DeTable<'_>) -> Result<(), Fault> {
         DeValue::Integer(number) if number.as_str() == super::model::VERSION.to_string() => Ok(()),
         DeValue::Integer(number) => Err(fault(number.as_str())),
         _ => Err(fault("no number")),
+    }
+}
+
+/// Keys with arrays.
+const ARRAYS: [&str; 8] =
+    ["domain", "subdevice", "sync_manager", "pdo", "entries", "startup", "connection", "protocols"];
+
+/// Refuses arrays in place of tables, which the reader of types takes as values without keys.
+fn tables(table: &DeTable<'_>, path: &mut Vec<Step>) -> Result<(), Fault> {
+    for (key, value) in table {
+        path.push(Step::Key(key.get_ref().to_string()));
+        match value.get_ref() {
+            DeValue::Array(array) if ARRAYS.contains(&&**key.get_ref()) => {
+                for (index, value) in array.iter().enumerate() {
+                    path.push(Step::Index(index));
+                    no_array(value.get_ref(), path)?;
+                    path.pop();
+                }
+            }
+            other => no_array(other, path)?,
+        }
+        path.pop();
+    }
+    Ok(())
+}
+
+fn no_array(value: &DeValue<'_>, path: &mut Vec<Step>) -> Result<(), Fault> {
+    match value {
+        DeValue::Table(table) => tables(table, path),
+        DeValue::Array(_) => Err(Fault { path: path.clone(), message: "expected a table, got an array".to_owned() }),
+        _ => Ok(()),
     }
 }
 

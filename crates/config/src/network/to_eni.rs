@@ -33,7 +33,11 @@ impl NetworkFile {
         for (index, of) in self.subdevice.iter().enumerate() {
             let declared = declared(&configuration, index, of)?;
             let config = &mut configuration.declaration.subdevices[index];
-            pdos::prepend(&mut config.startup, of);
+            if !pdos::place(&mut config.startup, of) {
+                let reason = "an ENI has the commands of each protocol, and those to registers, in lists of their own: the \
+                              commands that assign PDOs are behind the other ones of CoE, before those behind these";
+                left_out.push(LeftOut::new(index, "order of the start-up commands at PS", reason));
+            }
             config.sync_managers.clear();
             config.pdos = None;
             config.declared_bootstrap = bootstrap(of);
@@ -130,7 +134,7 @@ fn declared(
             model::Direction::Outputs => SyncManagerRole::Outputs,
             model::Direction::Inputs => SyncManagerRole::Inputs,
         };
-        let pdos = it.pdo.iter().map(super::declare::mapping).collect();
+        let pdos = it.pdo.iter().map(|pdo| super::declare::mapping(pdo).with_fixed(false)).collect();
         let one = buffer(it.number, role, Buffer { start, length }, control);
         found.push(one.with_op_only(it.op_only).with_pdos(pdos));
     }

@@ -56,8 +56,8 @@ impl Shift {
 
 impl Bytes {
     fn of(text: &str) -> Option<Bytes> {
-        let digits: Vec<u8> = text.bytes().filter(|byte| !byte.is_ascii_whitespace()).collect();
-        let pairs = digits.chunks(2).map(|pair| match pair {
+        let words = text.split_ascii_whitespace().flat_map(|word| word.as_bytes().chunks(2));
+        let pairs = words.map(|pair| match pair {
             [_, _] => u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok().filter(|_| pair[0] != b'+'),
             _ => None,
         });
@@ -136,7 +136,7 @@ macro_rules! from_text {
 from_text! {
     Time: "a time with ns, us, ms, s or min behind it, as in \"500us\"", "^[0-9]+(ns|us|ms|s|min)$";
     Shift: "a time that may have a minus, as in \"-10us\"", "^-?[0-9]+(ns|us|ms|s|min)$";
-    Bytes: "pairs of hexadecimal digits, as in \"e8 03\"", "^([0-9A-Fa-f]{2} *)*$";
+    Bytes: "pairs of hexadecimal digits, as in \"e8 03\"", "^\\s*([0-9A-Fa-f]{2}\\s*)*$";
     Mac: "six pairs of hexadecimal digits, as in \"02:00:00:00:00:01\"", "^([0-9A-Fa-f]{2}:){5}[0-9A-Fa-f]{2}$";
 }
 
@@ -160,6 +160,8 @@ mod tests {
             assert_eq!((Time::of(wrong), Shift::of(wrong)), (None, None), "{wrong}");
         }
         assert_eq!([Bytes::of("e"), Bytes::of("+1"), Bytes::of("e8 0"), Bytes::of("ä")], [const { None }; 4]);
+        // Blanks are between bytes, not within one: "0 1" is neither the byte 01 nor two bytes.
+        assert_eq!([Bytes::of("0 1"), Bytes::of("e8 0 3"), Bytes::of("e 803")], [const { None }; 3]);
         assert_eq!([Mac::of("02:00"), Mac::of("02:00:00:00:00:01:02"), Mac::of("2:0:0:0:0:1")], [None; 3]);
     }
 }

@@ -341,6 +341,7 @@ fn pdo(out: &mut Text, of: &Pdo) {
     out.table("[[subdevice.sync_manager.pdo]]");
     out.number("index", hex_4(of.index));
     out.text("name", &of.name);
+    out.flag("fixed", of.fixed);
     let Some(entries) = &of.entries else { return };
     if entries.is_empty() {
         return out.number("entries", "[]");
@@ -422,6 +423,7 @@ fn files(of: &Startup) -> Vec<(&'static str, Vec<Option<String>>)> {
 fn startup(out: &mut Text, of: &Startup) {
     out.table("[[subdevice.startup]]");
     out.word("at", of.at, At::default(), transition);
+    out.flag("after_pdos", of.after_pdos);
     let bytes = |bytes: &Bytes| format!("\"{bytes}\"");
     let mut inline = |key: &str, pairs: Vec<Option<String>>| {
         let pairs: Vec<String> = pairs.into_iter().flatten().collect();

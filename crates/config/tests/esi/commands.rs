@@ -2,9 +2,11 @@
 
 use std::time::Duration;
 
+use ringcat_config::ExportOptions;
+use ringcat_config::eni::{self, Transition};
 use ringcat_config::esi::{Choices, NoReferences, read_with, select};
 use ringcat_config::network::NetworkFile;
-use ringcat_config::network::model::{At, SubDevice};
+use ringcat_config::network::model::{At, Ip, Startup, SubDevice};
 use ringcat_engine::config::StartupAction;
 
 use crate::ACME;
@@ -12,6 +14,7 @@ use crate::reading::acme_of;
 
 /// Two PDOs of one and four bits in one SyncManager.
 const OUTPUTS: &str = include_str!("../files/outputs.xml");
+const ANALOG: usize = 2;
 const DRIVE: usize = 3;
 const CYCLE: Duration = Duration::from_millis(1);
 /// The mailbox of the drive.
@@ -103,6 +106,84 @@ fn a_start_up_command_of_soe_writes_the_value_of_an_idn_of_its_drive() {
         _ => None,
     });
     assert_eq!(actions.collect::<Vec<_>>(), sent, "the engine writes element 7, the value");
+}
+
+/// Objects that the commands of CoE at PS write in an exported ENI, each once in a row.
+fn exported(file: &NetworkFile) -> Vec<u16> {
+    let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let model = eni::read(export.text.as_bytes()).unwrap_or_else(|error| panic!("{error}"));
+    let coe = &model.subdevices[0].mailbox.as_ref().expect("a mailbox").coe;
+    let at_ps = coe.iter().filter(|command| command.transitions == [Transition::Ps]);
+    let mut objects: Vec<u16> = at_ps.map(|command| command.index).collect();
+    objects.dedup();
+    objects
+}
+
+/// The same of the network file, with the place of the PDOs.
+fn declared(file: &NetworkFile) -> Vec<(u16, bool)> {
+    let startup = &file.configuration().declaration.subdevices[0].startup;
+    let mut objects: Vec<(u16, bool)> = startup
+        .iter()
+        .filter_map(|it| match &it.action {
+            StartupAction::Sdo(sdo) => Some((sdo.index, it.is_after_pdos())),
+            _ => None,
+        })
+        .collect();
+    objects.dedup();
+    objects
+}
+
+// covers: esi-declare, ES-125, ES-126, eni-run
+#[test]
+fn modules_are_before_the_pdos_and_start_up_commands_behind_them() {
+    let command = |index: &str| {
+        format!(
+            "<InitCmd><Transition>PS</Transition><Index>{index}</Index><SubIndex>0</SubIndex><Data>01</Data></InitCmd>"
+        )
+    };
+    let (mut file, _) = network(&with_commands(&command("#x2000"), ""), DRIVE);
+    assert_eq!(declared(&file), [(0xF030, false), (0x2000, true), (0x6060, true)]);
+    assert_eq!(exported(&file), [0xF030, 0x1C12, 0x1C13, 0x2000, 0x6060]);
+    // What is written in the file stays where the file says.
+    file.subdevice[0].startup[0..].iter_mut().for_each(|it| it.after_pdos = !it.after_pdos);
+    assert_eq!(exported(&file), [0x2000, 0x6060, 0x1C12, 0x1C13, 0xF030]);
+    // A description that assigns the PDOs itself is corrected by the engine.
+    let (file, _) = network(&with_commands(&(command("#x2000") + &command("#x1C12")), ""), DRIVE);
+    assert_eq!(declared(&file), [(0xF030, false), (0x2000, false), (0x1C12, false), (0x6060, false)]);
+    assert_eq!(exported(&file), [0xF030, 0x2000, 0x1C12, 0x6060]);
+}
+
+// covers: esi-declare, ES-47, ES-125, eni-run
+#[test]
+fn the_mapping_of_a_fixed_pdo_is_not_written() {
+    let text = |fixed: &str| {
+        let text = ACME.replace("CoE SdoInfo=\"true\" PdoAssign=\"true\"", "CoE PdoAssign=\"1\" PdoConfig=\"1\"");
+        text.replace(
+            "<TxPdo Fixed=\"1\" Mandatory=\"1\" Sm=\"3\">",
+            &format!("<TxPdo{fixed} Mandatory=\"1\" Sm=\"3\">"),
+        )
+    };
+    let (file, _) = network(&text(" Fixed=\"1\""), ANALOG);
+    let fixed: Vec<(u16, bool)> = file.subdevice[0].sync_manager[1].pdo.iter().map(|it| (it.index, it.fixed)).collect();
+    assert_eq!(fixed, [(0x1A00, true), (0x1A02, true)]);
+    assert_eq!(exported(&file), [0x1C13, 0x8000]);
+    let (file, _) = network(&text(""), ANALOG);
+    assert_eq!(exported(&file), [0x1C13, 0x1A02, 0x1C13, 0x8000]);
+}
+
+// covers: eni-run, ES-125
+#[test]
+fn an_order_of_commands_that_an_eni_cannot_have_is_named() {
+    let (mut file, _) = network(&with_commands("", ""), DRIVE);
+    let idents = file.subdevice[0].startup.len();
+    let ip = Startup { ip: Some(Ip { name: Some("drive".to_owned()), ..Ip::default() }), ..Startup::default() };
+    file.subdevice[0].startup.push(ip);
+    assert_eq!(exported(&file), [0xF030, 0x1C12, 0x1C13, 0x6060]);
+    let left_out = file.to_eni(&ExportOptions::default()).map(|export| export.left_out).unwrap_or_default();
+    assert!(left_out.iter().any(|it| it.what.contains("order of the start-up commands")), "{left_out:?}");
+    file.subdevice[0].startup[idents].after_pdos = true;
+    let left_out = file.to_eni(&ExportOptions::default()).map(|export| export.left_out).unwrap_or_default();
+    assert!(!left_out.iter().any(|it| it.what.contains("order")), "{left_out:?}");
 }
 
 // covers: esi-declare, ES-68, ES-69

@@ -37,6 +37,27 @@ fn objects_have_the_names_of_pdos_then_of_the_dictionary_in_a_language() {
     );
 }
 
+// covers: esi-use, ES-47
+#[test]
+fn pdos_with_the_entries_that_a_description_fixes_are_fixed_in_a_file() {
+    let esi = acme();
+    let device = &esi.devices[ANALOG];
+    let choices = Choices::default();
+    let selection = select(&esi, device, &choices).expect("it has defaults");
+    let cycle = std::time::Duration::from_millis(1);
+    let mut scanned = SubDevice::from_esi(&selection, cycle, 1033).expect("it is declared").subdevice;
+    for pdo in scanned.sync_manager.iter_mut().flat_map(|sm| &mut sm.pdo) {
+        pdo.fixed = false;
+    }
+    let mut other = scanned.clone();
+    scanned.name_from_esi(device, &[], 1033);
+    let fixed = |of: &SubDevice| of.sync_manager[1].pdo.iter().map(|pdo| pdo.fixed).collect::<Vec<_>>();
+    assert_eq!(fixed(&scanned), [true, true]);
+    other.sync_manager[1].pdo[1].entries.iter_mut().flatten().for_each(|entry| entry.bits += 1);
+    other.name_from_esi(device, &[], 1033);
+    assert_eq!(fixed(&other), [true, false], "the device has another mapping");
+}
+
 // covers: esi-use, ES-64, ES-69
 #[test]
 fn modules_are_in_the_slots_of_the_idents_that_a_device_has_detected() {

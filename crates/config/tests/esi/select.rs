@@ -219,7 +219,7 @@ fn operation_modes_are_chosen_by_name_and_devices_without_controller_are_refused
     let by_module = select(&esi, &esi.devices[DRIVE], &Choices::default()).unwrap().mode.map(|mode| mode.name.clone());
     assert_eq!(by_module.as_deref(), Some("DC"), "the module of slot 0 needs it");
     let error = refused(&esi, DRIVE, &mode("DC9"));
-    assert!(error.contains("there is no operation mode \"DC9\": expected \"FreeRun\", \"DC\", \"DC4\""), "{error}");
+    assert!(error.contains("there is no operation mode \"DC9\": expected #1 \"FreeRun\" (no synchronisation), #2 \"DC\" (SYNC0), #3 \"DC4\" (four "), "{error}");
     let latch = acme_of(&ACME.replacen("<AssignActivate>#x0<", "<AssignActivate>#x0100<", 1));
     let startup = declared(&latch, DRIVE, &mode("FreeRun")).startup;
     let write = startup.iter().find_map(|startup| startup.write.as_ref()).expect("LATCH units are activated");
@@ -230,6 +230,26 @@ fn operation_modes_are_chosen_by_name_and_devices_without_controller_are_refused
     assert!(odd.contains("operation mode \"DC4\": a cycle of SYNC0"), "{odd}");
     let invisible = acme_of(&ACME.replacen("<Device Physics=\"YKY\">", "<Device Physics=\"YKY\" Invisible=\"1\">", 1));
     assert!(refused(&invisible, COUPLER, &Choices::default()).contains("it has no controller (Invisible)"));
+}
+
+// covers: esi-declare, ES-60
+#[test]
+fn modes_with_one_name_are_chosen_by_description_or_number() {
+    let mode = |text: &str| choices(|choices| choices.mode = Some(text.to_owned()));
+    let twice = ACME.replacen("<Name>DC4</Name>", "<Name>DC</Name>", 1);
+    let esi = acme_of(&twice);
+    let sync = |text: &str| declared(&esi, DRIVE, &mode(text)).sync.map(|sync| sync.assign_activate);
+    let several = "several operation modes are \"DC\": choose one by its description or its number: #2 \"DC\" (SYNC0), \
+                   #3 \"DC\" (four SYNC0 in a cycle, SYNC1 once)";
+    let error = refused(&esi, DRIVE, &mode("DC"));
+    assert!(error.contains(several), "{error}");
+    assert_eq!([sync("SYNC0"), sync("#2")], [Some(0x300); 2]);
+    assert_eq!([sync("four SYNC0 in a cycle, SYNC1 once"), sync(" #3 ")], [Some(0x700); 2]);
+    assert_eq!(sync("FreeRun"), None);
+    for wrong in ["#0", "#4", "#", "#-1", "four"] {
+        let error = refused(&esi, DRIVE, &mode(wrong));
+        assert!(error.contains(&format!("there is no operation mode \"{wrong}\"")), "{error}");
+    }
 }
 
 // covers: esi-declare, ES-47, ES-50

@@ -75,6 +75,32 @@ fn each_state_change_is_requested_and_waited_for() {
     }
 }
 
+// covers: ES-116, eni-run
+#[test]
+fn the_application_has_the_eeprom_while_it_starts_and_keeps_it_where_declared() {
+    let of = |text: &str, subdevice: usize, transition: Transition| -> Vec<(u16, u8)> {
+        let export = network(text).to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        let own = model(&export.text);
+        // Read again and written again it is the same.
+        let again = crate::again(&export.text, &ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        let lines = |eni: &Eni| -> Vec<(u16, u8)> {
+            let lines = at(&eni.subdevices[subdevice], transition).into_iter();
+            let those = lines.filter(|line| matches!(line.0, 0x0500 | 0x0120));
+            those.map(|line| (line.0, line.1[0])).collect()
+        };
+        assert_eq!(lines(&model(&again.text)), lines(&own));
+        lines(&own)
+    };
+    let with = CELL.replace("eeprom_to_pdi = true\n", "");
+    let (drive, coupler) = (1, 0);
+    assert_eq!(of(CELL, drive, Transition::Ip), [(0x0120, 0x11), (0x0500, 0), (0x0500, 1), (0x0120, 2)]);
+    let taken_back = [(0x0120, 0x11), (0x0500, 0), (0x0500, 1), (0x0120, 2), (0x0500, 0)];
+    assert_eq!(of(&with, drive, Transition::Ip), taken_back);
+    assert_eq!(of(&with, drive, Transition::Ib), [(0x0120, 0x11), (0x0500, 0), (0x0500, 1), (0x0120, 3)]);
+    assert_eq!(of(&with, drive, Transition::Bi), [(0x0120, 1), (0x0500, 0)]);
+    assert_eq!(of(&with, coupler, Transition::Ip), [(0x0120, 1), (0x0500, 0), (0x0120, 2)], "it has no mailbox");
+}
+
 // covers: ES-118, ES-119, ES-122, ES-135, eni-run
 #[test]
 fn registers_of_clocks_sync_managers_and_fmmus_have_the_bytes_of_other_tools() {

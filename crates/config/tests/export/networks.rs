@@ -24,9 +24,12 @@ fn the_eni_of_a_network_file_declares_the_network_of_the_file() {
         );
         for transition in [Transition::Ip, Transition::Ps, Transition::So, Transition::Os, Transition::Sp] {
             let own = of.startup.iter().filter(|command| command.transition == transition);
-            let all: Vec<_> = got.startup.iter().filter(|command| command.transition == transition).collect();
-            let own: Vec<_> = own.collect();
-            assert!(all.ends_with(&own), "{index}, {transition}: {all:?}");
+            let is_of_pdos = |action: &StartupAction| match action {
+                StartupAction::Sdo(sdo) => matches!(sdo.index, 0x1600..=0x1BFF | 0x1C10..=0x1C2F),
+                _ => false,
+            };
+            let all = got.startup.iter().filter(|it| it.transition == transition && !is_of_pdos(&it.action));
+            assert_eq!(all.collect::<Vec<_>>(), own.collect::<Vec<_>>(), "{index}, {transition}");
         }
         let limits = |from, to| (of.limit(from, to), got.limit(from, to));
         for (from, to) in [(AlState::Init, AlState::PreOp), (AlState::Op, AlState::Init)] {

@@ -266,3 +266,16 @@ fn names_and_comments_are_on_one_line() {
         names.chain(model.subdevices.iter().flat_map(|it| &it.init_commands).map(|it| &it.comment)).cloned().collect();
     assert!(all.contains("left") && all.contains("more") && !all.contains(char::is_control), "{all:?}");
 }
+
+// covers: eni-read, ES-113
+#[test]
+fn ids_above_2_to_the_31_may_be_written_as_negative_numbers() {
+    let text = SMALL.replacen("<VendorId>2</VendorId>", "<VendorId>-268435455</VendorId>", 1);
+    let text = text.replacen("<RevisionNo>1179648</RevisionNo>", "<RevisionNo>-1</RevisionNo>", 1);
+    let coupler = &model(&text).subdevices[0];
+    assert_eq!((coupler.vendor_id, coupler.revision), (Some(0xF000_0001), Some(u32::MAX)));
+    for wrong in ["-2147483649", "4294967296"] {
+        let error = refusal(&SMALL.replacen("<VendorId>2<", &format!("<VendorId>{wrong}<"), 1));
+        assert!(error.contains("a number from 0 to 4294967295") && error.contains(wrong), "{error}");
+    }
+}

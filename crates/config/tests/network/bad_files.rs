@@ -103,6 +103,11 @@ const CHANGES: &[(&str, &str, &str)] = &[
         "expected one of sdo, upload, idn, read_idn, ip, aoe, voe, write_file, read_file, write and check, got 2 of \
          them",
     ),
+    (
+        "at = \"SO\"\n",
+        "at = \"SO\"\nafter_pdos = true\n",
+        "subdevice[1].startup[3].after_pdos: PDOs are written at PS: expected no `at`, or \"PS\"",
+    ),
     ("at = \"SO\"\n", "at = \"II\"\n", "subdevice[1].startup[3].at: II is in INIT, which has no mailbox"),
     (
         "read_idn = { drive = 2",
@@ -144,6 +149,17 @@ const CHANGES: &[(&str, &str, &str)] = &[
         "subdevice[1].mailbox.read: expected an end within 64 KiB",
     ),
     ("[clocks]\n", "[clock]\n", "unknown key `clock`"),
+    (
+        "passage = { processing_ns = 300, forwarding_ns = 10 }",
+        "passage = [300, 10]",
+        "subdevice[1].passage: expected a table, got an array",
+    ),
+    (
+        "{ index = 0x6041, bits = 16 }",
+        "[0x6041, 0, 16]",
+        "subdevice[1].sync_manager[1].pdo[0].entries[0]: expected a table, got an array",
+    ),
+    ("data = \"e8 03\"", "data = \"e8 0 3\"", "subdevice[1].startup[0].sdo.data: expected pairs of hexadecimal digits"),
     ("name = \"Drive\"\n", "name = \"Drive\"\nname = \"Drive\"\n", "duplicate key"),
 ];
 

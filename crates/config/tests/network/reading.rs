@@ -62,6 +62,7 @@ fn every_key_is_in_the_declaration() {
     let pdos = drive.pdos.as_ref().expect("PDOs");
     let shape: Vec<_> = pdos.iter().map(|it| (it.sync_manager, it.direction, it.pdos.len())).collect();
     assert_eq!(shape, [(2, Direction::Outputs, 1), (3, Direction::Inputs, 2)]);
+    assert_eq!(pdos[1].pdos.iter().map(|pdo| pdo.fixed).collect::<Vec<_>>(), [true, false]);
     assert!(pdos[1].pdos[1].entries.is_none(), "the entries of the SII");
     assert_eq!(drive.sync_managers.iter().map(|it| it.watchdog).collect::<Vec<_>>(), [Watchdog::Off]);
     assert!(tool.pdos.is_none(), "a length alone declares no PDOs");
@@ -83,6 +84,8 @@ fn every_key_is_in_the_declaration() {
     let gains = FileWrite::new("gains.txt", b"1\n").with_password(0x0102_0304);
     assert_eq!(drive.startup[13].action, StartupAction::FileWrite(gains));
     assert_eq!(drive.startup[14].action, StartupAction::FileRead(FileRead::new("log.txt")));
+    let after: Vec<usize> = (0..15).filter(|number| drive.startup[*number].is_after_pdos()).collect();
+    assert_eq!(after, [14]);
     assert!(matches!(&drive.startup[1].action, StartupAction::Sdo(sdo) if sdo.complete_access));
     assert_eq!(drive.startup[0].comment.as_deref(), Some("ramp of \\ 1 s"));
     let members: Vec<Vec<(usize, Option<Vec<u8>>)>> = declaration

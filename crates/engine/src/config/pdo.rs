@@ -1,6 +1,7 @@
 //! PDOs that the application declares: assignments to SyncManagers, and mappings.
 
 use alloc::vec::Vec;
+use core::hash::{Hash, Hasher};
 
 use crate::info::Direction;
 
@@ -17,13 +18,26 @@ pub struct PdoEntry {
 }
 
 /// A PDO and its mapping.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct PdoMapping {
     /// Index of the PDO mapping object.
     pub index: u16,
     /// Its entries; `None` takes those of the SII.
     pub entries: Option<Vec<PdoEntry>>,
+    /// The SubDevice does not permit other entries: its mapping object is never written.
+    pub fixed: bool,
+}
+
+/// A mapping that may be written has the digest that it had before there were others.
+impl Hash for PdoMapping {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        let PdoMapping { index, entries, fixed } = self;
+        (index, entries).hash(state);
+        if *fixed {
+            fixed.hash(state);
+        }
+    }
 }
 
 /// Base of the PDO assignment objects: 0x1C10 + number of the SyncManager.
@@ -56,12 +70,19 @@ impl PdoAssignment {
 impl PdoMapping {
     /// A PDO with the entries of the SII.
     pub fn from_sii(index: u16) -> PdoMapping {
-        PdoMapping { index, entries: None }
+        PdoMapping { index, entries: None, fixed: false }
     }
 
     /// A PDO with these entries.
     pub fn of(index: u16, entries: impl Into<Vec<PdoEntry>>) -> PdoMapping {
-        PdoMapping { index, entries: Some(entries.into()) }
+        PdoMapping { index, entries: Some(entries.into()), fixed: false }
+    }
+
+    /// Sets [`PdoMapping::fixed`].
+    #[must_use]
+    pub fn with_fixed(mut self, fixed: bool) -> PdoMapping {
+        self.fixed = fixed;
+        self
     }
 }
 

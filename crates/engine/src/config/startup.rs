@@ -4,6 +4,7 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt;
+use core::hash::{Hash, Hasher};
 use core::time::Duration;
 
 use ringcat_wire::al::AlState;
@@ -335,7 +336,7 @@ pub enum StartupAction {
 }
 
 /// A start-up command.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct StartupCommand {
     /// The transition.
@@ -346,9 +347,35 @@ pub struct StartupCommand {
     pub limit: Option<Duration>,
     /// Purpose, as the author of the declaration wrote it; for messages.
     pub comment: Option<String>,
+    /// It is sent behind the PDO assignment and mapping of the declaration; otherwise before them. Only at PS, where
+    /// these are written.
+    pub after_pdos: bool,
+}
+
+/// A command before the PDOs has the digest that it had before there were others.
+impl Hash for StartupCommand {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        let StartupCommand { transition, action, limit, comment, after_pdos } = self;
+        (transition, action, limit, comment).hash(state);
+        if *after_pdos {
+            after_pdos.hash(state);
+        }
+    }
 }
 
 impl StartupCommand {
+    /// Sets [`StartupCommand::after_pdos`].
+    #[must_use]
+    pub fn with_after_pdos(mut self, after_pdos: bool) -> StartupCommand {
+        self.after_pdos = after_pdos;
+        self
+    }
+
+    /// Whether it is sent behind the PDOs.
+    pub fn is_after_pdos(&self) -> bool {
+        self.after_pdos && self.transition == Transition::Ps
+    }
+
     /// Sets [`StartupCommand::limit`].
     #[must_use]
     pub fn with_limit(mut self, limit: impl Into<Option<Duration>>) -> StartupCommand {
@@ -365,6 +392,6 @@ impl StartupCommand {
 
     /// A command with the default time limit and without a comment.
     pub const fn new(transition: Transition, action: StartupAction) -> StartupCommand {
-        StartupCommand { transition, action, limit: None, comment: None }
+        StartupCommand { transition, action, limit: None, comment: None, after_pdos: false }
     }
 }

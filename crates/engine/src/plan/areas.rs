@@ -152,7 +152,7 @@ fn declared_pdos(
     limit(ASSIGNMENT_BASE + u16::from(sync_manager), assignment.pdos.len())?;
     let mut bit = 0;
     let mut mapped = Vec::with_capacity(assignment.pdos.len());
-    for PdoMapping { index, entries } in &assignment.pdos {
+    for PdoMapping { index, entries, .. } in &assignment.pdos {
         let described = info.pdo(*index);
         if let Some(got) = described.map(|pdo| pdo.direction).filter(|got| *got != expected) {
             return Err(PlanProblem::PdoDirection { sync_manager, pdo: *index, expected, got });

@@ -19,7 +19,8 @@ pub(super) fn pdo_plans(
     let mut plans = Vec::new();
     for area in areas {
         let sync_manager = area.sync_manager;
-        let is_declared = config.pdos.iter().flatten().any(|assignment| assignment.sync_manager == sync_manager);
+        let declared = config.pdos.iter().flatten().find(|assignment| assignment.sync_manager == sync_manager);
+        let is_declared = declared.is_some();
         // Without a declaration those of the SubDevice stay, whatever they are: the SII describes none, or start-up
         // commands write them.
         let is_described = info.pdo_source.is_of_dictionary() || info.assigned_pdos(sync_manager).next().is_some();
@@ -27,7 +28,8 @@ pub(super) fn pdo_plans(
             continue;
         }
         let wanted = PdoAssignment::new(sync_manager, area.direction, area.pdos.iter().map(wanted).collect());
-        let mut plan = PdoPlan { wanted, details: info.coe, sdos: Vec::new() };
+        let fixed = declared.iter().flat_map(|it| &it.pdos).filter(|pdo| pdo.fixed).map(|pdo| pdo.index).collect();
+        let mut plan = PdoPlan { wanted, details: info.coe, fixed, sdos: Vec::new() };
         let held = HeldPdos::of(info, sync_manager);
         if is_declared {
             warn(&plan, &held, has_dictionary, warnings);
@@ -63,9 +65,9 @@ fn writes_pdos(config: &SubDeviceConfig) -> bool {
 /// What cannot be written: the SubDevice decides whether it accepts it nevertheless.
 fn warn(plan: &PdoPlan, held: &HeldPdos, has_dictionary: bool, warnings: &mut Vec<PlanWarning>) {
     let (sync_manager, is_assigned) = (plan.wanted.sync_manager, plan.is_assigned_in(held));
-    let mut changed = plan.changed(held);
+    let changed = || plan.changed(held);
     if !has_dictionary {
-        if !is_assigned || changed.next().is_some() {
+        if !is_assigned || changed().next().is_some() {
             warnings.push(PlanWarning::NoCoe { sync_manager });
         }
         return;
@@ -73,7 +75,6 @@ fn warn(plan: &PdoPlan, held: &HeldPdos, has_dictionary: bool, warnings: &mut Ve
     if !is_assigned && !plan.can_assign() {
         warnings.push(PlanWarning::FixedAssignment { sync_manager });
     }
-    if !plan.can_map() {
-        warnings.extend(changed.map(|pdo| PlanWarning::FixedMapping { pdo: pdo.index }));
-    }
+    let kept = changed().filter(|pdo| !plan.can_map_pdo(pdo.index));
+    warnings.extend(kept.map(|pdo| PlanWarning::FixedMapping { pdo: pdo.index }));
 }

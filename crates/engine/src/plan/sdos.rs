@@ -18,6 +18,8 @@ pub struct PdoPlan {
     pub wanted: PdoAssignment,
     /// What the SubDevice permits; without any details it may permit all.
     pub details: CoeDetails,
+    /// The PDOs whose mapping the SubDevice fixes.
+    pub fixed: Vec<u16>,
     /// The downloads, if the dictionary holds what is known of it.
     pub sdos: Vec<SdoDownload>,
 }
@@ -67,6 +69,11 @@ impl PdoPlan {
         self.details.0 == 0 || self.details.pdo_configuration()
     }
 
+    /// Whether the mapping of a PDO may be written.
+    pub(super) fn can_map_pdo(&self, pdo: u16) -> bool {
+        self.can_map() && !self.fixed.contains(&pdo)
+    }
+
     pub(super) fn is_assigned_in(&self, held: &HeldPdos) -> bool {
         let wanted = self.wanted.pdos.iter().map(|pdo| pdo.index);
         held.assigned.as_ref().is_some_and(|assigned| wanted.eq(assigned.iter().copied()))
@@ -79,7 +86,7 @@ impl PdoPlan {
 
     /// The downloads that bring a dictionary from what it holds to what is planned, as far as the SubDevice permits.
     pub(crate) fn downloads(&self, held: &HeldPdos) -> Vec<SdoDownload> {
-        let changed: Vec<&PdoMapping> = self.changed(held).filter(|_| self.can_map()).collect();
+        let changed: Vec<&PdoMapping> = self.changed(held).filter(|pdo| self.can_map_pdo(pdo.index)).collect();
         // The mapping of an assigned PDO cannot be changed.
         let is_assigned = self.can_assign() && (!self.is_assigned_in(held) || !changed.is_empty());
         let object = self.object();

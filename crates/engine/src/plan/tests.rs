@@ -226,6 +226,18 @@ fn an_assignment_without_pdos_disables_the_sync_manager() {
     assert!(!fmmu(area, LogicalAddress(0)).active);
 }
 
+// covers: plan, ES-47
+#[test]
+fn the_mapping_of_a_fixed_pdo_is_never_written() {
+    let mapping = |fixed| PdoMapping::of(0x1A02, [PdoEntry::new(0x6020, 1, 8)]).with_fixed(fixed);
+    let of = |fixed| plan(&any().assign(3, Direction::Inputs, vec![mapping(fixed)]), &device()).unwrap();
+    let objects = |plan: &SubDevicePlan| sdos(plan).iter().map(|sdo| sdo.0).collect::<Vec<_>>();
+    let (free, fixed) = (of(false), of(true));
+    assert_eq!(objects(&free), [0x1C13, 0x1A02, 0x1A02, 0x1A02, 0x1C13, 0x1C13]);
+    assert_eq!((objects(&fixed), free.warnings), (vec![0x1C13; 3], vec![]));
+    assert_eq!(fixed.warnings, [PlanWarning::FixedMapping { pdo: 0x1A02 }], "it is not what the SII describes");
+}
+
 #[test]
 fn a_change_that_the_sii_does_not_permit_is_a_warning_and_not_written() {
     let info = SubDeviceInfo { coe: CoeDetails(CoeDetails::SDO), ..device() };

@@ -1,8 +1,7 @@
 //! An ENI from a file: parsed, evaluated, and ready for activation.
 
 use std::fmt;
-use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use ringcat_config::eni::{Eni, EniError, MAX_BYTES, read};
@@ -17,6 +16,7 @@ use ringcat_sim::segment::SegmentError;
 
 #[cfg(feature = "sim")]
 use super::segment::segment;
+use crate::regular_file::read_at_most;
 use crate::text::Names;
 
 /// An ENI with the configuration derived from it.
@@ -90,11 +90,8 @@ impl EniFile {
     /// [`LoadError`]: with line, column and element where something in it is wrong.
     pub fn load(path: &Path) -> Result<EniFile, LoadError> {
         let failed = |cause| LoadError { path: path.to_owned(), cause };
-        // The limit applies to the bytes that are read: a device or a pipe reports no length.
-        let mut bytes = Vec::new();
-        let room = MAX_BYTES as u64 + 1;
-        let read = File::open(path).and_then(|file| file.take(room).read_to_end(&mut bytes));
-        read.map_err(|error| failed(LoadFailure::Read(error)))?;
+        let read = read_at_most(path, MAX_BYTES as u64 + 1);
+        let bytes = read.map_err(|error| failed(LoadFailure::Read(error)))?;
         if bytes.len() > MAX_BYTES {
             return Err(failed(LoadFailure::TooLarge));
         }

@@ -97,14 +97,39 @@ fn add_modules(
             added.extend(pdos.iter().map(|pdo| described(device, pdo, direction)));
         }
     }
-    if added.is_empty() {
-        return Ok(());
+    if !added.is_empty() {
+        let of_file = |index: u16| device.rx_pdos.iter().chain(&device.tx_pdos).any(|pdo| pdo.index.index == index);
+        let is_new = |index: u16| added.iter().any(|pdo| pdo.index == index);
+        description.pdos.retain(|pdo| of_file(pdo.index) && !is_new(pdo.index));
+        description.pdos.extend(added);
     }
-    let of_file = |index: u16| device.rx_pdos.iter().chain(&device.tx_pdos).any(|pdo| pdo.index.index == index);
-    let is_new = |index: u16| added.iter().any(|pdo| pdo.index == index);
-    description.pdos.retain(|pdo| of_file(pdo.index) && !is_new(pdo.index));
-    description.pdos.extend(added);
+    add_copies(device, description);
     Ok(())
+}
+
+/// Adds the copies of PDOs with oversampling (protocol ES-47), as many as may be assigned. By default none is.
+fn add_copies(device: &Device, description: &mut DeviceDescription) {
+    let modes = device.clock.iter().flat_map(|clock| &clock.modes).flat_map(|mode| &mode.sync_managers);
+    let of_modes: Vec<(u16, u32)> =
+        modes.flat_map(|sm| &sm.pdos).filter_map(|(index, factor)| Some((*index, (*factor)?))).collect();
+    for pdo in device.rx_pdos.iter().chain(&device.tx_pdos) {
+        let Some([default, _, most, distance]) = pdo.oversampling else { continue };
+        let Some(own) = description.pdos.iter().find(|it| it.index == pdo.index.index).cloned() else { continue };
+        let range = match own.direction {
+            PdoDirection::Rx => 0x1600..=0x17FF,
+            PdoDirection::Tx => 0x1A00..=0x1BFF,
+        };
+        let listed = of_modes.iter().filter(|(index, _)| *index == own.index).map(|(_, factor)| *factor);
+        let count = listed.chain([default, most]).max().unwrap_or(1);
+        let indices = (1..count).map_while(|copy| copy.checked_mul(distance)?.checked_add(own.index.into()));
+        let indices = indices.take_while(|index| range.contains(index)).filter_map(|index| u16::try_from(index).ok());
+        // No index occurs again with a distance above 0.
+        for index in indices.take_while(|index| *index != own.index) {
+            if description.pdos.iter().all(|it| it.index != index) {
+                description.pdos.push(PdoDescription { index, sync_manager: None, ..own.clone() });
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -138,6 +163,37 @@ mod tests {
         );
         let esi = read("acme.xml", text.as_bytes()).expect("a description");
         describe(&esi, &esi.devices[0], &[], "a")
+    }
+
+    // covers: esi-use, ES-47
+    #[test]
+    fn copies_by_oversampling_are_in_the_device_and_not_assigned_by_default() {
+        let of = |attributes: &str, mode: &str| {
+            let text = format!(
+                "<EtherCATInfo><Vendor><Id>71</Id></Vendor><Descriptions><Groups/><Devices><Device Physics=\"YY\">\
+                 <Type ProductCode=\"1\" RevisionNo=\"1\">A1</Type><Name>n</Name>\
+                 <Sm StartAddress=\"#x1100\" ControlByte=\"#x20\" Enable=\"1\">Inputs</Sm>\
+                 <TxPdo Sm=\"0\" {attributes}><Index>#x1A00</Index><Name>s</Name><Entry><Index>#x6000</Index>\
+                 <SubIndex>1</SubIndex><BitLen>16</BitLen><Name>v</Name><DataType>INT</DataType></Entry></TxPdo>\
+                 <TxPdo><Index>#x1A10</Index><Name>t</Name></TxPdo>{mode}</Device></Devices></Descriptions>\
+                 </EtherCATInfo>"
+            );
+            let esi = read("acme.xml", text.as_bytes()).expect("a description");
+            let device = describe(&esi, &esi.devices[0], &[], "a").expect("a device");
+            let shown = device.pdos.iter().map(|pdo| (pdo.index, pdo.sync_manager, pdo.entries.len()));
+            shown.collect::<Vec<_>>()
+        };
+        let plain = [(0x1A00, Some(0), 1), (0x1A10, None, 0)];
+        let copies = [(0x1A20, None, 1), (0x1A30, None, 1)];
+        let sampled = "OSFac=\"2\" OSMin=\"1\" OSMax=\"4\" OSIndexInc=\"16\"";
+        assert_eq!(of("", ""), plain);
+        assert_eq!(of(sampled, ""), [&plain[..], &copies].concat(), "0x1a10 is a PDO of its own");
+        let mode = "<Dc><OpMode><Name>D</Name><AssignActivate>0</AssignActivate><Sm No=\"0\"><Pdo OSFac=\"5\">#x1A00\
+                    </Pdo></Sm></OpMode></Dc>";
+        assert_eq!(of(sampled, mode), [&plain[..], &copies, &[(0x1A40, None, 1)]].concat());
+        assert_eq!(of(&sampled.replace("\"16\"", "\"0\""), ""), plain);
+        let many = of(&sampled.replace("\"4\"", "\"4294967295\"").replace("\"16\"", "\"1\""), "");
+        assert_eq!((many.len(), many.last()), (0x200, Some(&(0x1BFF, None, 1))));
     }
 
     // covers: esi-use, ES-72

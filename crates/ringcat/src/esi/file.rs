@@ -2,12 +2,14 @@
 
 use std::cell::RefCell;
 use std::fmt;
-use std::fs::{self, File};
-use std::io::{self, Read};
+use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use ringcat_config::eni::MAX_BYTES;
 use ringcat_config::esi::{Esi, EsiError, References, read_with};
+
+use crate::regular_file::read_at_most;
 
 /// Why a description cannot be used.
 #[derive(Debug)]
@@ -59,11 +61,9 @@ pub(super) fn load_noting(path: &Path) -> (Result<Esi, EsiFailure>, Vec<PathBuf>
     (bytes.and_then(read), folder.opened.into_inner())
 }
 
-/// Reads at most one byte more than the limit, also from a device or a pipe.
+/// Reads at most one byte more than the limit.
 pub(super) fn bytes_of(path: &Path) -> io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    File::open(path)?.take(MAX_BYTES as u64 + 1).read_to_end(&mut bytes)?;
-    Ok(bytes)
+    read_at_most(path, MAX_BYTES as u64 + 1)
 }
 
 /// The folder of a description. File names are compared case-insensitively.

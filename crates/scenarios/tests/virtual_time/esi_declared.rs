@@ -11,6 +11,7 @@ use ringcat::config::network::model::SubDevice;
 use ringcat::eni::EniImage;
 use ringcat::esi::{EsiDevices, load};
 use ringcat::network::{LoadedNetwork, NetworkFile};
+use ringcat::sim::application::ServedMail;
 use ringcat::sim::cable::DeviceIndex;
 use ringcat::sim::network::Network;
 use ringcat::sim::segment::Segment;
@@ -18,6 +19,8 @@ use ringcat::simulated::SimulatedSegment;
 use ringcat::text::{Names, describe};
 use ringcat::{MainDevice, Options};
 use ringcat_wire::al::{AlState, AlStatus};
+use ringcat_wire::mailbox::Protocol;
+use ringcat_wire::mailbox::sdo::SdoRequest;
 use scenarios::seeds;
 
 const LIMIT: Duration = Duration::from_secs(30);
@@ -38,6 +41,18 @@ fn push(file: &mut NetworkFile, esi: &Esi, device: usize, choices: &Choices) -> 
     let from = SubDevice::from_esi(&selection, PERIOD, 1033).map_err(|error| error.to_string())?;
     file.push(from.subdevice);
     Ok(())
+}
+
+/// Objects that a device got by downloads, each once in a row.
+fn written(network: &Network, at: usize) -> Vec<u16> {
+    let of = |mail: &ServedMail| match SdoRequest::decode(&mail.payload).ok()? {
+        SdoRequest::DownloadExpedited { index, .. } | SdoRequest::DownloadNormal { index, .. } => Some(index),
+        _ => None,
+    };
+    let served = network.device(DeviceIndex(at)).application.served_mail();
+    let mut objects: Vec<u16> = served.iter().filter(|mail| mail.protocol == Protocol::Coe).filter_map(of).collect();
+    objects.dedup();
+    objects
 }
 
 const SEGMENT: &str = r#"
@@ -83,7 +98,13 @@ fn chosen_pdos_modules_and_values_are_in_the_devices_in_op() {
     };
     let mut application = main_device.activate(network.declaration()).unwrap();
     let mut image = EniImage::new(&network.configuration, application.directory()).unwrap();
+    for at in 0..4 {
+        application.links_mut().network_mut().device_mut(DeviceIndex(at)).application.record_mail();
+    }
     application.wait_until_op(LIMIT).unwrap();
+    // The value and the start-up command come behind the PDOs, the list of modules before them (ES-125, ES-126).
+    assert_eq!(written(application.links().network(), 2), [0x1C13, 0x8000]);
+    assert_eq!(written(application.links().network(), 3), [0xF030, 0x6060]);
     let read = |at: usize, index, sub| {
         let dictionary = application.links().network().device(DeviceIndex(at)).application.dictionary();
         let bytes = dictionary.read(index, sub).unwrap_or_else(|code| panic!("{index:#06x}:{sub}: {code}"));

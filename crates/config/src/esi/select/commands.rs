@@ -1,4 +1,5 @@
-//! Start-up commands: modules, those of the description, parameters (protocol ES-55, ES-58, ES-59, ES-67, ES-70).
+//! Start-up commands: modules, those of the description, parameters (protocol ES-55, ES-58, ES-59, ES-67, ES-70,
+//! ES-125, ES-126).
 
 use std::collections::HashSet;
 
@@ -13,7 +14,7 @@ const MODULE_IDENTS: u16 = 0xF030;
 /// Start-up commands of all modules, at most.
 const MAX_COMMANDS: usize = 1 << 16;
 
-/// All commands: the list of modules, then those of the description, then the parameters.
+/// All commands: the list of modules, then behind the PDOs those of the description, then the parameters.
 pub(super) fn commands(work: &mut Work<'_>) -> Result<Vec<SelectedCommand>, EsiError> {
     let mut commands = module_idents(work);
     let device = work.device;
@@ -52,13 +53,21 @@ pub(super) fn commands(work: &mut Work<'_>) -> Result<Vec<SelectedCommand>, EsiE
     for parameter in &work.choices.parameters {
         commands.push(parameter_command(work, parameter)?);
     }
+    // A description that writes the PDOs itself: the engine corrects them to what was chosen.
+    let before_pdos =
+        commands.iter().any(|it| matches!(it.message, SelectedMessage::Sdo(index, ..) if is_of_pdos(index)));
+    commands.iter_mut().for_each(|command| command.before_pdos |= before_pdos);
     Ok(commands)
+}
+
+const fn is_of_pdos(index: u16) -> bool {
+    matches!(index, 0x1600..=0x17FF | 0x1A00..=0x1BFF | 0x1C10..=0x1C2F)
 }
 
 fn add(commands: &mut Vec<SelectedCommand>, transitions: &[Transition], message: SelectedMessage, comment: &str) {
     for transition in transitions {
         let (message, comment) = (message.clone(), comment.to_owned());
-        commands.push(SelectedCommand { transition: *transition, message, comment });
+        commands.push(SelectedCommand { transition: *transition, message, comment, before_pdos: false });
     }
 }
 
@@ -81,6 +90,7 @@ fn module_idents(work: &mut Work<'_>) -> Vec<SelectedCommand> {
         transition: slots.download_transition,
         message: SelectedMessage::Sdo(MODULE_IDENTS, sub_index, false, data),
         comment: comment.to_owned(),
+        before_pdos: true,
     };
     let entries =
         (1..=u8::MAX).zip(0..count).map(|(sub, slot)| command(sub, ident(slot).to_le_bytes().to_vec(), "module ident"));
@@ -129,7 +139,7 @@ fn parameter_command(work: &Work<'_>, of: &Parameter) -> Result<SelectedCommand,
         }
     };
     let message = SelectedMessage::Sdo(*index, *sub_index, false, data.clone());
-    Ok(SelectedCommand { transition: *transition, message, comment })
+    Ok(SelectedCommand { transition: *transition, message, comment, before_pdos: false })
 }
 
 /// Whether a number is within the limits of its object.

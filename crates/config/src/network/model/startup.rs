@@ -15,6 +15,9 @@ pub struct Startup {
     /// The transition; PS if the key is missing.
     #[serde(default)]
     pub at: At,
+    /// At PS: it is sent behind the PDO assignment and mapping; before them if the key is missing.
+    #[serde(default)]
+    pub after_pdos: bool,
     /// SDO download.
     pub sdo: Option<Sdo>,
     /// SDO upload.

@@ -3,15 +3,43 @@
 
 use ringcat_engine::config::{SdoDownload, StartupAction, StartupCommand, Transition};
 
+use crate::export::is_expressible;
 use crate::network::model::{Pdo, Protocol, SubDevice};
 
 /// PDO assignment of SyncManager n.
 const ASSIGNMENT: u16 = 0x1C10;
 
-/// Puts them before the start-up commands of the file, unless these have some of their own.
-pub(super) fn prepend(startup: &mut Vec<StartupCommand>, of: &SubDevice) {
+/// Puts them between the start-up commands of the file before the PDOs and those behind, as the engine sends them, unless
+/// the file has some of its own. Where an ENI cannot have this order, they are directly behind the other commands of
+/// CoE: false.
+pub(super) fn place(startup: &mut Vec<StartupCommand>, of: &SubDevice) -> bool {
+    let commands = commands(startup, of);
+    if commands.is_empty() {
+        return true;
+    }
+    let with = |list: &[StartupCommand], place: usize| [&list[..place], &commands[..], &list[place..]].concat();
+    let mut sorted = startup.clone();
+    sorted.sort_by_key(StartupCommand::is_after_pdos);
+    let before = sorted.iter().position(StartupCommand::is_after_pdos).unwrap_or(sorted.len());
+    let exact = with(&sorted, before);
+    let is_exact = is_expressible(&exact);
+    let last = |list: &[StartupCommand]| list.iter().rposition(is_coe_before).map_or(0, |last| last + 1);
+    let others = [with(&sorted[..], last(&sorted)), with(startup, last(startup))];
+    *startup = others.into_iter().find(|list| !is_exact && is_expressible(list)).unwrap_or(exact);
+    startup.iter_mut().for_each(|command| command.after_pdos = false);
+    is_exact
+}
+
+/// Whether a command of CoE is sent at PS before the PDOs.
+fn is_coe_before(command: &StartupCommand) -> bool {
+    let is_coe = matches!(command.action, StartupAction::Sdo(_) | StartupAction::Upload(_));
+    is_coe && command.transition == Transition::Ps && !command.after_pdos
+}
+
+/// None without CoE, and if start-up commands write the objects.
+fn commands(startup: &[StartupCommand], of: &SubDevice) -> Vec<StartupCommand> {
     let Some(mailbox) = of.mailbox.as_ref().filter(|mailbox| mailbox.protocols.contains(&Protocol::CoE)) else {
-        return;
+        return Vec::new();
     };
     let is_own = |command: &StartupCommand| match &command.action {
         StartupAction::Sdo(download) => {
@@ -20,7 +48,7 @@ pub(super) fn prepend(startup: &mut Vec<StartupCommand>, of: &SubDevice) {
         _ => false,
     };
     if startup.iter().any(is_own) {
-        return;
+        return Vec::new();
     }
     let mut commands = Vec::new();
     for it in of.sync_manager.iter().filter(|it| !it.pdo.is_empty()) {
@@ -30,7 +58,7 @@ pub(super) fn prepend(startup: &mut Vec<StartupCommand>, of: &SubDevice) {
         }
         // The mapping of an assigned PDO cannot be changed.
         if mailbox.pdo_assign && mailbox.pdo_config {
-            it.pdo.iter().for_each(|pdo| map(pdo, &mut commands));
+            it.pdo.iter().filter(|pdo| !pdo.fixed).for_each(|pdo| map(pdo, &mut commands));
         }
         if mailbox.pdo_assign {
             for (sub, pdo) in (1..=u8::MAX).zip(&it.pdo) {
@@ -41,7 +69,7 @@ pub(super) fn prepend(startup: &mut Vec<StartupCommand>, of: &SubDevice) {
             commands.push(download(object, 0, [count], format!("set count of sm pdos ({object:#06x})")));
         }
     }
-    startup.splice(0..0, commands);
+    commands
 }
 
 fn map(pdo: &Pdo, commands: &mut Vec<StartupCommand>) {

@@ -26,24 +26,28 @@ impl BringUp<'_> {
         self.command_those(transition, |_| true).await
     }
 
+    /// Sends the commands of PS before the PDOs are written, or those behind.
+    pub(super) async fn command_pdos(&self, is_after: bool) -> Result<(), ConfigureError> {
+        self.command_those(Transition::Ps, |command| command.is_after_pdos() == is_after).await
+    }
+
     /// Sends the commands that need no mailbox.
     pub(super) async fn command_registers(&self, transition: Transition) -> Result<(), ConfigureError> {
-        self.command_those(transition, |action| matches!(action, StartupAction::Register(_))).await
+        self.command_those(transition, |command| matches!(command.action, StartupAction::Register(_))).await
     }
 
     /// Sends the commands that need the mailbox.
     pub(super) async fn command_mail(&self, transition: Transition) -> Result<(), ConfigureError> {
-        self.command_those(transition, |action| !matches!(action, StartupAction::Register(_))).await
+        self.command_those(transition, |command| !matches!(command.action, StartupAction::Register(_))).await
     }
 
     async fn command_those(
         &self,
         transition: Transition,
-        wanted: fn(&StartupAction) -> bool,
+        wanted: impl Fn(&StartupCommand) -> bool,
     ) -> Result<(), ConfigureError> {
         let all = self.config.startup.iter().enumerate();
-        for (number, command) in all.filter(|(_, command)| command.transition == transition && wanted(&command.action))
-        {
+        for (number, command) in all.filter(|(_, command)| command.transition == transition && wanted(command)) {
             let sent = self.send(number, command).await;
             let comment = || command.comment.clone();
             sent.map_err(|error| ConfigureError::Startup { number, transition, comment: comment(), error })?;
