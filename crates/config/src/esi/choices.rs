@@ -6,7 +6,8 @@ use super::model::Transition;
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Choices {
-    /// Operation mode of the clock by its name, its description, or its number as in "#3"; `None`: that of its modules, else the first.
+    /// Operation mode of the clock by its name, its description, or its number as in "#3"; `None`: that of its
+    /// modules, else the first.
     pub mode: Option<String>,
     /// The module of each slot, as for [`place_modules`](super::place_modules).
     pub modules: Vec<Option<String>>,

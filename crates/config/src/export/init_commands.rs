@@ -55,17 +55,14 @@ pub(super) fn complete(
     fmmus: &[Fmmu],
     own: Own,
 ) -> Vec<EcatCommand> {
+    use EngineTransition as At;
     use Transition::{Bi, Ib, Ip, Oi, Op, Os, Pi, Po, Ps, Si, So, Sp};
     let mut out = Commands { own, list: Vec::new() };
     out.state(config, &[Pi, Si, Oi, Bi], AlState::Init);
-    for transition in [EngineTransition::Pi, EngineTransition::Si, EngineTransition::Oi, EngineTransition::Bi] {
-        out.raw(config, transition);
-    }
-    out.raw(config, EngineTransition::Ii);
+    [At::Pi, At::Si, At::Oi, At::Bi, At::Ii].into_iter().for_each(|transition| out.raw(config, transition));
     let (mailboxes, data): (Vec<_>, Vec<_>) = declared.iter().partition(|it| it.role.direction().is_none());
     let has_mailbox = !mailboxes.is_empty();
-    out.begin_in_init(config, has_mailbox);
-    out.begin(config);
+    out.begin(config, has_mailbox);
     let ways: &[Transition] =
         if config.declared_bootstrap.is_some() { &[Ip, Ib, Pi, Si, Oi, Bi] } else { &[Ip, Ib, Pi, Si, Oi] };
     mailboxes.iter().for_each(|it| out.clear_sync_manager(ways, it.index));
@@ -75,8 +72,8 @@ pub(super) fn complete(
     }
     out.raw(config, EngineTransition::Ib);
     if config.declared_bootstrap.is_some() {
-        out.write(&[Ib], "assign EEPROM to PDI", map::SII_CONFIGURATION, vec![1]);
-        out.write(&[Bi], "assign EEPROM back to ECAT", map::SII_CONFIGURATION, vec![0]);
+        out.eeprom_to_pdi(Ib);
+        out.eeprom_back(Bi);
     }
     out.state(config, &[Ib], AlState::Boot);
     if config.sync.is_some() {
@@ -85,11 +82,11 @@ pub(super) fn complete(
     out.raw(config, EngineTransition::Ip);
     // An application reads it while it starts (protocol ES-116), as in a bring-up of the engine.
     if has_mailbox || config.sii_to_pdi {
-        out.write(&[Ip], "assign EEPROM to PDI", map::SII_CONFIGURATION, vec![1]);
+        out.eeprom_to_pdi(Ip);
     }
     out.state(config, &[Ip], AlState::PreOp);
     if has_mailbox && !config.sii_to_pdi {
-        out.write(&[Ip], "assign EEPROM back to ECAT", map::SII_CONFIGURATION, vec![0]);
+        out.eeprom_back(Ip);
     }
     out.process_data(config, &data, fmmus);
     out.raw(config, EngineTransition::Pp);
@@ -218,9 +215,18 @@ impl Commands {
         }
     }
 
-    /// Address, identity, watchdogs.
-    fn begin(&mut self, config: &SubDeviceConfig) {
+    fn eeprom_to_pdi(&mut self, transition: Transition) {
+        self.write(&[transition], "assign EEPROM to PDI", map::SII_CONFIGURATION, vec![1]);
+    }
+
+    fn eeprom_back(&mut self, transition: Transition) {
+        self.write(&[transition], "assign EEPROM back to ECAT", map::SII_CONFIGURATION, vec![0]);
+    }
+
+    /// INIT, address, identity, watchdogs.
+    fn begin(&mut self, config: &SubDeviceConfig, has_mailbox: bool) {
         use Transition::{Ib, Ip};
+        self.begin_in_init(config, has_mailbox);
         let station = self.own.station.to_le_bytes().to_vec();
         let boot = config.declared_bootstrap.is_some();
         let first: &[Transition] = if boot { &[Ip, Ib] } else { &[Ip] };

@@ -361,12 +361,7 @@ fn command(startup: &Startup) -> Checked {
         let keys = "sdo, upload, idn, read_idn, ip, aoe, voe, write_file, read_file, write and check";
         return fault([], format!("expected one of {keys}, got {count} of them"));
     }
-    if startup.at == At::Ii && startup.write.is_none() && startup.check.is_none() {
-        return fault(["at".into()], "II is in INIT, which has no mailbox: expected write or check".to_owned());
-    }
-    if startup.after_pdos && startup.at != At::Ps {
-        return fault(["after_pdos".into()], "PDOs are written at PS: expected no `at`, or \"PS\"");
-    }
+    time(startup)?;
     messages(startup)?;
     files(startup)?;
     complete(startup)?;
@@ -400,6 +395,17 @@ fn command(startup: &Startup) -> Checked {
     {
         let message = format!("expected {} bytes as in data, got {}", check.data.0.len(), mask.0.len());
         return fault(["check".into(), "mask".into()], message);
+    }
+    Ok(())
+}
+
+/// When it is sent.
+fn time(startup: &Startup) -> Checked {
+    if startup.at == At::Ii && startup.write.is_none() && startup.check.is_none() {
+        return fault(["at".into()], "II is in INIT, which has no mailbox: expected write or check");
+    }
+    if startup.after_pdos && startup.at != At::Ps {
+        return fault(["after_pdos".into()], "PDOs are written at PS: expected no `at`, or \"PS\"");
     }
     Ok(())
 }

@@ -34,8 +34,8 @@ impl NetworkFile {
             let declared = declared(&configuration, index, of)?;
             let config = &mut configuration.declaration.subdevices[index];
             if !pdos::place(&mut config.startup, of) {
-                let reason = "an ENI has the commands of each protocol, and those to registers, in lists of their own: the \
-                              commands that assign PDOs are behind the other ones of CoE, before those behind these";
+                let reason = "an ENI has the commands of each protocol, and those to registers, in lists of their own: \
+                              the commands that assign PDOs are behind the other ones of CoE, before those behind these";
                 left_out.push(LeftOut::new(index, "order of the start-up commands at PS", reason));
             }
             config.sync_managers.clear();

@@ -219,7 +219,8 @@ fn operation_modes_are_chosen_by_name_and_devices_without_controller_are_refused
     let by_module = select(&esi, &esi.devices[DRIVE], &Choices::default()).unwrap().mode.map(|mode| mode.name.clone());
     assert_eq!(by_module.as_deref(), Some("DC"), "the module of slot 0 needs it");
     let error = refused(&esi, DRIVE, &mode("DC9"));
-    assert!(error.contains("there is no operation mode \"DC9\": expected #1 \"FreeRun\" (no synchronisation), #2 \"DC\" (SYNC0), #3 \"DC4\" (four "), "{error}");
+    let known = "expected #1 \"FreeRun\" (no synchronisation), #2 \"DC\" (SYNC0), #3 \"DC4\" (four ";
+    assert!(error.contains(&format!("there is no operation mode \"DC9\": {known}")), "{error}");
     let latch = acme_of(&ACME.replacen("<AssignActivate>#x0<", "<AssignActivate>#x0100<", 1));
     let startup = declared(&latch, DRIVE, &mode("FreeRun")).startup;
     let write = startup.iter().find_map(|startup| startup.write.as_ref()).expect("LATCH units are activated");
