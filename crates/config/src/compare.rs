@@ -5,6 +5,7 @@
 //! not a wrong identity of all behind it.
 
 mod align;
+mod assignment;
 mod cables;
 mod contents;
 mod difference;
@@ -122,6 +123,15 @@ impl Configuration {
             differences.extend(cables::compare(self, &pairs, found, topology));
         }
         differences
+    }
+
+    /// Whether the file assigns PDOs to a SubDevice of this vendor and product that its SII does not list: it may have
+    /// modules in slots ([`Stated::modular`]).
+    pub fn has_unlisted_pdos(&self, found: &SubDeviceInfo, stated: &[Stated]) -> bool {
+        let declared = self.declaration.subdevices.iter().enumerate();
+        declared
+            .filter(|(config, declared)| align::is_device(declared, stated.get(*config), found))
+            .any(|(_, declared)| process_data::pdos(declared).any(|(_, pdo)| found.pdo(pdo.index).is_none()))
     }
 
     fn missing(&self, config: usize, names: &[String], fails: bool) -> Difference {

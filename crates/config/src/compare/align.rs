@@ -138,7 +138,7 @@ fn by_mark(configs: &[SubDeviceConfig], found: &[SubDeviceInfo], info_of: &mut [
 }
 
 /// Whether a found SubDevice has the vendor and the product of a declared one.
-fn is_device(config: &SubDeviceConfig, stated: Option<&Stated>, info: &SubDeviceInfo) -> bool {
+pub(super) fn is_device(config: &SubDeviceConfig, stated: Option<&Stated>, info: &SubDeviceInfo) -> bool {
     let stated = stated.and_then(|stated| stated.device);
     let vendor = config.expected.vendor_id.or(stated.map(|device| device.0));
     let product = config.expected.product_code.or(stated.map(|device| device.1));

@@ -206,7 +206,24 @@ fn pdos_that_are_left_out_prevent_op_where_the_assignment_cannot_be_written() {
     let differences = judged(&left(1, 8), &types);
     assert_eq!(kinds(&differences), [(Pdos, true)], "{differences:#?}");
     assert!(differences[0].text.contains("SM 0: expected a length of 1, got 2"), "{}", differences[0].text);
-    assert_eq!(kinds(&judged(&left(2, 3), &types)), [], "it is written");
+    assert_eq!(kinds(&judged(&left(2, 3), &types)), [(Pdos, false)], "it is written");
+}
+
+/// A SyncManager that only the file leaves out keeps its PDOs; a file without any leaves all to the SubDevice.
+// covers: network-file
+#[test]
+fn a_syncmanager_that_the_file_leaves_out_is_a_difference_unless_all_are() {
+    let without = |at: usize, kept: usize| {
+        let change = |file: &mut NetworkFile| file.subdevice[at].sync_manager.truncate(kept);
+        judged(&file_of(&BUS, change), &BUS)
+    };
+    for (at, count) in [(DRIVE, 2), (ANALOG, 1)] {
+        for kept in 0..count {
+            let expected: &[_] = if kept == 0 { &[] } else { &[(Pdos, false)] };
+            let differences = without(at, kept);
+            assert_eq!(kinds(&differences), expected, "{at}, {kept}: {differences:#?}");
+        }
+    }
 }
 
 // covers: network-file
@@ -225,11 +242,12 @@ fn cables_and_mailboxes_of_a_network_file_do_not_prevent_op() {
 #[test]
 fn differences_from_an_eni_are_judged_by_the_bus_too() {
     type Change = fn(&mut NetworkFile);
-    let changes: [(Change, &[(DifferenceKind, bool)]); 4] = [
+    let changes: [(Change, &[(DifferenceKind, bool)]); 5] = [
         (|_| (), &[]),
         (|file| file.subdevice[DRIVE].mailbox.as_mut().expect("CoE").read.length -= 2, &[(Mailbox, true)]),
         (|file| pdo_entries(&mut file.subdevice[OUTPUTS])[0].bits += 8, &[(Pdos, true)]),
         (|file| drop(pdo_entries(&mut file.subdevice[DRIVE]).pop()), &[(Pdos, false)]),
+        (|file| drop(file.subdevice[DRIVE].sync_manager.pop()), &[(Pdos, true)]),
     ];
     for (change, expected) in changes {
         let file = file_of(&BUS, change).file;
