@@ -5,11 +5,13 @@
 //! not a wrong identity of all behind it.
 
 mod align;
+mod alike;
 mod assignment;
 mod cables;
 mod contents;
 mod difference;
 mod marks;
+mod moves;
 mod order;
 mod process_data;
 
