@@ -3,6 +3,8 @@
 //! A difference is only reported: process data depends on the order of the SubDevices, not on their ports. But the
 //! search for a broken cable with the drawing of the machine needs the real cabling.
 
+use std::collections::BTreeSet;
+
 use ringcat_engine::config::{Resolution, resolve};
 use ringcat_engine::declared::SubDeviceId;
 use ringcat_engine::info::SubDeviceInfo;
@@ -47,6 +49,7 @@ pub(super) fn compare(
     for (config, info) in pairs {
         place[*config] = Some(usize::from(found[*info].position.0));
     }
+    let known: BTreeSet<usize> = place.iter().copied().flatten().collect();
     let names = configuration.names();
     // A SubDevice that is not in the file is named by its position.
     let name = |node: usize| match place.iter().position(|place| *place == Some(node)) {
@@ -70,6 +73,9 @@ pub(super) fn compare(
             None => None,
         };
         let got = topology.connection_to(at(node)).map(|cable| cable.near);
+        if said == behind_additional(got, topology, &known) {
+            continue;
+        }
         // The cabling where a ring is open is unknown.
         if said == got || (got.is_none() && topology.redundant_head() == Some(at(node))) {
             continue;
@@ -85,6 +91,21 @@ pub(super) fn compare(
         });
     }
     differences
+}
+
+/// Where a cable ends if additional SubDevices are taken out: these are differences themselves.
+fn behind_additional(got: Option<PortOf>, topology: &Topology, known: &BTreeSet<usize>) -> Option<PortOf> {
+    let mut end = got;
+    // A line has at most as many SubDevices as there are positions.
+    for _ in 0..=u16::MAX {
+        match end {
+            Some(near) if !known.contains(&usize::from(near.position().0)) => {
+                end = topology.connection_to(near.position()).map(|cable| cable.near);
+            }
+            _ => break,
+        }
+    }
+    end
 }
 
 const fn number(port: Port) -> u8 {
