@@ -101,7 +101,8 @@ impl Configuration {
                             subdevice: Some(SubDeviceId(config)),
                             position: Some(found[info].position),
                             kind: DifferenceKind::Order,
-                            prevents_op: marks.fails(config),
+                            prevents_op: marks.fails(config)
+                                || order.other(config).is_some_and(|other| marks.fails(other)),
                             text,
                         });
                     }

@@ -81,6 +81,14 @@ impl Order {
         })
     }
 
+    /// The one that a SubDevice has changed places with.
+    pub(super) fn other(&self, config: usize) -> Option<usize> {
+        match self.moves[*self.index.get(&config)?] {
+            Some(Move::With(other)) => Some(self.declared[other].config),
+            _ => None,
+        }
+    }
+
     fn behind_on_bus(&self, at: usize, names: &[String]) -> String {
         let own = self.by_bus.iter().position(|other| *other == at);
         self.behind(own.and_then(|own| own.checked_sub(1)).map(|before| self.by_bus[before]), names)
