@@ -25,14 +25,17 @@ pub(super) fn names_modules(declared: &SubDeviceConfig) -> bool {
     })
 }
 
-/// The SyncManagers with another assignment, each with one text.
+/// The SyncManagers with another assignment, each with one text; none where the file cannot be planned, which has a
+/// reason of its own.
 pub(super) fn differences(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> Vec<(u8, String)> {
     let wanted = wanted(declared);
     let is_silent = wanted.values().all(|pdos| pdos.as_ref().is_none_or(Vec::is_empty)) && declared.declared.is_some();
     if info.pdos.is_empty() || wanted.is_empty() || is_silent {
         return Vec::new();
     }
-    let Ok(own) = plan(&SubDeviceConfig::from_info(info), info) else { return Vec::new() };
+    let (Ok(own), Ok(_)) = (plan(&SubDeviceConfig::from_info(info), info), plan(declared, info)) else {
+        return Vec::new();
+    };
     let writes_pdos = declared.startup.iter().any(|command| process_data::writes_pdos(&command.action));
     let mut differences = Vec::new();
     for area in &own.process_data {
@@ -70,23 +73,24 @@ fn wanted(declared: &SubDeviceConfig) -> BTreeMap<u8, Option<Vec<u16>>> {
     wanted
 }
 
-/// How two assignments differ. PDOs that the SubDevice does not describe are differences of their own.
+/// How two assignments differ, with the PDOs that the SubDevice does not describe.
 fn text(expected: &[u16], got: &[u16], info: &SubDeviceInfo) -> Option<String> {
-    let expected: Vec<u16> = expected.iter().copied().filter(|index| info.pdo(*index).is_some()).collect();
     let without = |these: &[u16], others: &[u16]| -> Vec<u16> {
         these.iter().copied().filter(|index| !others.contains(index)).collect()
     };
-    let (missing, more) = (without(&expected, got), without(got, &expected));
-    match (&missing[..], &more[..]) {
+    let (missing, more) = (without(expected, got), without(got, expected));
+    let text = match (&missing[..], &more[..]) {
         ([], []) => {
             let at = (0..got.len().max(expected.len())).find(|at| expected.get(*at) != got.get(*at))?;
             let word = |pdos: &[u16]| pdos.get(at).map_or_else(|| "none".to_owned(), |index| list(&[*index]));
-            Some(format!("expected {} at place {} of the assignment, got {}", word(&expected), at + 1, word(got)))
+            format!("expected {} at place {} of the assignment, got {}", word(expected), at + 1, word(got))
         }
-        ([], more) => Some(format!("{} assigned, but not in the file", with_verb(more))),
-        (missing, []) => Some(format!("{} in the file, but not assigned", with_verb(missing))),
-        (missing, more) => Some(format!("expected {}, got {}", list(missing), list(more))),
-    }
+        ([], more) => format!("{} assigned, but not in the file", with_verb(more)),
+        (missing, []) => format!("{} in the file, but not assigned", with_verb(missing)),
+        (missing, more) => format!("expected {}, got {}", list(missing), list(more)),
+    };
+    let unknown: Vec<u16> = missing.into_iter().filter(|index| info.pdo(*index).is_none()).collect();
+    Some(if unknown.is_empty() { text } else { format!("{text}; the SubDevice does not describe {}", list(&unknown)) })
 }
 
 fn with_verb(pdos: &[u16]) -> String {

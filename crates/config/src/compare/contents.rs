@@ -102,6 +102,7 @@ impl Both<'_> {
             named.insert(sync_manager);
             differences.push(self.difference(DifferenceKind::Pdos, prevents_op, text));
         };
+        let assigned_else: BTreeSet<u8> = assigned.iter().map(|(sync_manager, _)| *sync_manager).collect();
         for (sync_manager, text) in assigned {
             match unfit.get(&sync_manager) {
                 Some(lengths) => add(sync_manager, format!("{text}; {lengths}"), true),
@@ -109,7 +110,9 @@ impl Both<'_> {
             }
         }
         for (sync_manager, pdo) in process_data::pdos(declared) {
-            if let Some(text) = pdo_difference(pdo, info, is_modular) {
+            // One that the SubDevice does not describe is named with the assignment.
+            let may_lack = is_modular || assigned_else.contains(&sync_manager);
+            if let Some(text) = pdo_difference(pdo, info, may_lack) {
                 add(sync_manager, text, unfit.contains_key(&sync_manager));
             }
         }
@@ -149,26 +152,32 @@ fn buffers(mailbox: Option<[(u16, u16); 2]>) -> String {
 }
 
 /// How a PDO differs from the one that the SubDevice describes. A SubDevice that describes no PDO at all has no
-/// difference: its dictionary was not read. One with modules may have others.
-fn pdo_difference(pdo: &PdoMapping, info: &SubDeviceInfo, is_modular: bool) -> Option<String> {
+/// difference: its dictionary was not read. `may_lack`: one that it does not describe is none.
+fn pdo_difference(pdo: &PdoMapping, info: &SubDeviceInfo, may_lack: bool) -> Option<String> {
     if info.pdos.is_empty() {
         return None;
     }
     let index = pdo.index;
     let Some(described) = info.pdo(index) else {
         let count = info.pdos.len();
-        return (!is_modular)
-            .then(|| format!("PDO {index:#06x} is not among the {count} that the SubDevice describes"));
+        return (!may_lack).then(|| format!("PDO {index:#06x} is not among the {count} that the SubDevice describes"));
     };
     let ours = pdo.entries.as_ref()?;
     let theirs: Vec<PdoEntry> = entries(described);
-    let at = (0..ours.len().max(theirs.len())).find(|at| ours.get(*at) != theirs.get(*at))?;
+    let mut others = (0..ours.len().max(theirs.len())).filter(|at| ours.get(*at) != theirs.get(*at));
+    let at = others.next()?;
+    let more = match others.count() {
+        0 => String::new(),
+        1 => "; 1 more entry differs".to_owned(),
+        count => format!("; {count} more entries differ"),
+    };
     let word = |entry: Option<&PdoEntry>| match entry {
         None => "nothing".to_owned(),
         Some(entry) if entry.index == 0 => format!("a gap of {} bits", entry.bit_length),
         Some(entry) => format!("{:#06x}:{:02x} of {} bits", entry.index, entry.sub_index, entry.bit_length),
     };
-    Some(format!("PDO {index:#06x}, entry {}: expected {}, got {}", at + 1, word(ours.get(at)), word(theirs.get(at))))
+    let (expected, got) = (word(ours.get(at)), word(theirs.get(at)));
+    Some(format!("PDO {index:#06x}, entry {}: expected {expected}, got {got}{more}", at + 1))
 }
 
 fn entries(described: &PdoInfo) -> Vec<PdoEntry> {
