@@ -55,14 +55,21 @@ struct Declared {
 
 /// Scans and prints every difference.
 pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
-    let Declared { configuration, stated, names: declared } = load(arguments)?;
+    let Declared { configuration, mut stated, names: declared } = load(arguments)?;
     let mut descriptions = arguments.esi.open()?;
     let with_firmware: Vec<(u32, u32)> =
         stated.iter().filter(|it| !it.firmware.is_empty()).filter_map(|it| it.device).collect();
     let mut bus = arguments.bus.scan(|info| Wanted {
         firmware: with_firmware.contains(&(info.identity.vendor_id, info.identity.product_code)),
-        modules: descriptions.as_mut().is_some_and(|it| it.has_modules(info)),
+        modules: descriptions.as_mut().is_some_and(|it| it.has_modules(info))
+            || configuration.has_unlisted_pdos(info, &stated),
     })?;
+    for (info, modules) in bus.scan.subdevices.iter().zip(&bus.modules) {
+        let device = Some((info.identity.vendor_id, info.identity.product_code));
+        if !modules.is_empty() || descriptions.as_mut().is_some_and(|it| it.has_modules(info)) {
+            stated.iter_mut().filter(|it| it.device == device).for_each(|it| it.modular = true);
+        }
+    }
     let described = complete(descriptions.as_mut(), &mut bus.scan.subdevices, &bus.modules)?;
     bus.oddities.print(&described);
     let found = &bus.scan.subdevices;

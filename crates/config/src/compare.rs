@@ -5,10 +5,13 @@
 //! not a wrong identity of all behind it.
 
 mod align;
+mod alike;
+mod assignment;
 mod cables;
 mod contents;
 mod difference;
 mod marks;
+mod moves;
 mod order;
 mod process_data;
 
@@ -98,7 +101,8 @@ impl Configuration {
                             subdevice: Some(SubDeviceId(config)),
                             position: Some(found[info].position),
                             kind: DifferenceKind::Order,
-                            prevents_op: marks.fails(config),
+                            prevents_op: marks.fails(config)
+                                || order.other(config).is_some_and(|other| marks.fails(other)),
                             text,
                         });
                     }
@@ -125,6 +129,15 @@ impl Configuration {
             differences.extend(cables::compare(self, &pairs, found, topology));
         }
         differences
+    }
+
+    /// Whether the file assigns PDOs to a SubDevice of this vendor and product that its SII does not list: it may have
+    /// modules in slots ([`Stated::modular`]).
+    pub fn has_unlisted_pdos(&self, found: &SubDeviceInfo, stated: &[Stated]) -> bool {
+        let declared = self.declaration.subdevices.iter().enumerate();
+        declared
+            .filter(|(config, declared)| alike::is_device(declared, stated.get(*config), found))
+            .any(|(_, declared)| process_data::pdos(declared).any(|(_, pdo)| found.pdo(pdo.index).is_none()))
     }
 
     fn missing(&self, config: usize, names: &[String], prevents_op: bool) -> Difference {

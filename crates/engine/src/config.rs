@@ -20,6 +20,7 @@ mod repetition;
 mod resolution;
 mod resolve;
 mod startup;
+mod steps;
 mod sync_modes;
 mod timeouts;
 

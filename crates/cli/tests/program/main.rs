@@ -1,5 +1,6 @@
 //! The program `ringcat` as a user calls it: what needs no network interface.
 
+mod compared;
 mod daemon;
 mod demo;
 #[cfg(feature = "standby")]

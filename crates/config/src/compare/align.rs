@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 use ringcat_engine::config::{ConfigAddress, SubDeviceConfig};
 use ringcat_engine::info::SubDeviceInfo;
 
+use super::alike::{Alike, DeviceKey, OWN, device};
 use super::difference::Stated;
+use super::moves::moves;
 use crate::configuration::Configuration;
 
 /// Maximum number of compared pairs between the common begin and end; beyond it SubDevices are compared by position.
@@ -42,16 +44,25 @@ pub(super) fn align(configuration: &Configuration, found: &[SubDeviceInfo], stat
     let mut moved = vec![false; configs.len()];
     let mut taken = vec![false; found.len()];
     by_mark(configs, found, &mut info_of, &mut taken);
-    let is_device = |config: usize, info: usize| is_device(&configs[config], stated.get(config), &found[info]);
+    let alike = Alike::new(configs, found, stated);
+    let is_own = |config: usize, info: usize| alike.degree(config, info) == OWN;
     let mut declared: Vec<usize> = (0..configs.len()).filter(|config| by_position(&configs[*config])).collect();
     declared.sort_by_key(|config| position(&configs[*config]));
     let free: Vec<usize> = (0..found.len()).filter(|info| !taken[*info]).collect();
-    for (config, info) in common(&declared, &free, &is_device) {
+    for (config, info) in common(&declared, &free, &|config, info| alike.degree(config, info)) {
         (info_of[config], taken[info]) = (Some(info), true);
     }
-    // What is missing here and additional there has moved.
-    let mut by_device = ByDevice::new(found);
+    // What is missing here and additional there has moved. A serial number that the file demands is found anywhere.
     for config in declared.iter().copied().filter(|config| info_of[*config].is_none()).collect::<Vec<_>>() {
+        if let Some(info) = alike.serial_at(config).filter(|info| !taken[*info] && is_own(config, *info)) {
+            (info_of[config], taken[info], moved[config]) = (Some(info), true, true);
+        }
+    }
+    let mut by_device = ByDevice::new(found);
+    let has_serial = |config: usize| configs[config].expected.serial.is_some();
+    for config in
+        declared.iter().copied().filter(|config| info_of[*config].is_none() && !has_serial(*config)).collect::<Vec<_>>()
+    {
         if let Some(info) = by_device.first(device(&configs[config], stated.get(config)), &taken) {
             (info_of[config], taken[info], moved[config]) = (Some(info), true, true);
         }
@@ -64,14 +75,29 @@ pub(super) fn align(configuration: &Configuration, found: &[SubDeviceInfo], stat
             None => Some(0),
             Some(other) => info_of[other].map(|info| info + 1),
         };
-        if let Some(info) = info.filter(|info| *info < found.len() && !taken[*info]) {
+        if let Some(info) = info.filter(|info| *info < found.len() && !taken[*info] && !alike.is_claimed(config, *info))
+        {
             (info_of[config], taken[info]) = (Some(info), true);
         }
     }
+    name_moves(configs, &info_of, &mut moved);
     if !taken.contains(&false) && !moved.contains(&true) {
         exact_positions(configs, &info_of, &mut moved);
     }
     in_order(&info_of, &moved, &taken)
+}
+
+/// Which of those that are declared by position and were found stand elsewhere.
+fn name_moves(configs: &[SubDeviceConfig], info_of: &[Option<usize>], moved: &mut [bool]) {
+    let mut both: Vec<(usize, usize)> = (0..configs.len())
+        .filter(|config| by_position(&configs[*config]))
+        .filter_map(|config| Some((config, info_of[config]?)))
+        .collect();
+    both.sort_by_key(|(config, _)| position(&configs[*config]));
+    let bus: Vec<usize> = both.iter().map(|(_, info)| *info).collect();
+    for ((config, _), change) in both.into_iter().zip(moves(&bus)) {
+        moved[config] = change.is_some();
+    }
 }
 
 /// Where each SubDevice has its counterpart in the order of positions, each has to be at its position: the file may
@@ -137,9 +163,6 @@ fn before(declared: &[usize], count: usize) -> Vec<Option<usize>> {
     before_each.collect()
 }
 
-/// Vendor and product; `None`: any.
-type DeviceKey = (Option<u32>, Option<u32>);
-
 /// The SubDevices that were found, by what a declaration can say of their device.
 struct ByDevice {
     /// In their order, from the last one on; those at the end may be taken.
@@ -200,59 +223,46 @@ fn by_mark(configs: &[SubDeviceConfig], found: &[SubDeviceInfo], info_of: &mut [
     }
 }
 
-/// Vendor and product of a declared SubDevice.
-fn device(config: &SubDeviceConfig, stated: Option<&Stated>) -> DeviceKey {
-    let stated = stated.and_then(|stated| stated.device);
-    let vendor = config.expected.vendor_id.or(stated.map(|device| device.0));
-    (vendor, config.expected.product_code.or(stated.map(|device| device.1)))
-}
-
-/// Whether a found SubDevice has the vendor and the product of a declared one.
-fn is_device(config: &SubDeviceConfig, stated: Option<&Stated>, info: &SubDeviceInfo) -> bool {
-    let (vendor, product) = device(config, stated);
-    vendor.is_none_or(|vendor| vendor == info.identity.vendor_id)
-        && product.is_none_or(|product| product == info.identity.product_code)
-}
-
-/// The longest common sequence; by position where the networks are too large and too different for it.
-fn common(configs: &[usize], infos: &[usize], is_device: &impl Fn(usize, usize) -> bool) -> Vec<(usize, usize)> {
+/// The best common sequence; by position where the networks are too large and too different for it.
+fn common(configs: &[usize], infos: &[usize], degree: &impl Fn(usize, usize) -> u32) -> Vec<(usize, usize)> {
     let both = configs.iter().copied().zip(infos.iter().copied());
-    let head = both.take_while(|(config, info)| is_device(*config, *info)).count();
+    let head = both.take_while(|(config, info)| degree(*config, *info) == OWN).count();
     let (rest_configs, rest_infos) = (&configs[head..], &infos[head..]);
     let both = rest_configs.iter().rev().copied().zip(rest_infos.iter().rev().copied());
-    let tail = both.take_while(|(config, info)| is_device(*config, *info)).count();
+    let tail = both.take_while(|(config, info)| degree(*config, *info) == OWN).count();
     let (middle, between) = (&rest_configs[..rest_configs.len() - tail], &rest_infos[..rest_infos.len() - tail]);
     let mut pairs: Vec<(usize, usize)> = configs.iter().copied().zip(infos.iter().copied()).take(head).collect();
     if middle.len().saturating_mul(between.len()) <= MAX_PAIRS {
-        pairs.extend(longest(middle, between, is_device));
+        pairs.extend(best(middle, between, degree));
     } else {
         let same = middle.iter().copied().zip(between.iter().copied());
-        pairs.extend(same.filter(|(config, info)| is_device(*config, *info)));
+        pairs.extend(same.filter(|(config, info)| degree(*config, *info) > 0));
     }
     let ends = rest_configs[middle.len()..].iter().copied().zip(rest_infos[between.len()..].iter().copied());
     pairs.extend(ends);
     pairs
 }
 
-fn longest(configs: &[usize], infos: &[usize], is_device: &impl Fn(usize, usize) -> bool) -> Vec<(usize, usize)> {
+/// The sequence with most pairs of one SubDevice, then with most pairs of one device.
+fn best(configs: &[usize], infos: &[usize], degree: &impl Fn(usize, usize) -> u32) -> Vec<(usize, usize)> {
     let width = infos.len() + 1;
-    let mut lengths = vec![0u32; (configs.len() + 1) * width];
+    let mut sums = vec![0u32; (configs.len() + 1) * width];
     for row in (0..configs.len()).rev() {
         for column in (0..infos.len()).rev() {
-            lengths[row * width + column] = if is_device(configs[row], infos[column]) {
-                lengths[(row + 1) * width + column + 1] + 1
-            } else {
-                lengths[(row + 1) * width + column].max(lengths[row * width + column + 1])
-            };
+            let both = sums[(row + 1) * width + column + 1] + degree(configs[row], infos[column]);
+            let one = sums[(row + 1) * width + column].max(sums[row * width + column + 1]);
+            sums[row * width + column] = both.max(one);
         }
     }
     let (mut row, mut column) = (0, 0);
     let mut pairs = Vec::new();
     while row < configs.len() && column < infos.len() {
-        if is_device(configs[row], infos[column]) {
+        let (below, right) = (sums[(row + 1) * width + column], sums[row * width + column + 1]);
+        let degree = degree(configs[row], infos[column]);
+        if degree > 0 && sums[row * width + column] == sums[(row + 1) * width + column + 1] + degree {
             pairs.push((configs[row], infos[column]));
             (row, column) = (row + 1, column + 1);
-        } else if lengths[(row + 1) * width + column] >= lengths[row * width + column + 1] {
+        } else if below >= right {
             row += 1;
         } else {
             column += 1;

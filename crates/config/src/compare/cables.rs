@@ -75,6 +75,9 @@ pub(super) fn compare(
             None => None,
         };
         let got = topology.connection_to(at(node)).map(|cable| cable.near);
+        if said == behind_additional(got, topology, &config_at) {
+            continue;
+        }
         // The cabling where a ring is open is unknown.
         if said == got || (got.is_none() && topology.redundant_head() == Some(at(node))) {
             continue;
@@ -90,6 +93,21 @@ pub(super) fn compare(
         });
     }
     differences
+}
+
+/// Where a cable ends if additional SubDevices are taken out: these are differences themselves.
+fn behind_additional(got: Option<PortOf>, topology: &Topology, known: &BTreeMap<usize, usize>) -> Option<PortOf> {
+    let mut end = got;
+    // A line has at most as many SubDevices as there are positions.
+    for _ in 0..=u16::MAX {
+        match end {
+            Some(near) if !known.contains_key(&usize::from(near.position().0)) => {
+                end = topology.connection_to(near.position()).map(|cable| cable.near);
+            }
+            _ => break,
+        }
+    }
+    end
 }
 
 const fn number(port: Port) -> u8 {

@@ -1,5 +1,7 @@
 //! One SubDevice: identity, PDOs and mailboxes of the file and of the bus.
 
+use std::collections::BTreeSet;
+
 use ringcat_engine::config::{
     DeclaredSyncManager, IdentityMismatch, PdoEntry, PdoMapping, SubDeviceConfig, SyncManagerRole,
 };
@@ -7,8 +9,9 @@ use ringcat_engine::declared::SubDeviceId;
 use ringcat_engine::info::{PdoInfo, SubDeviceInfo};
 use ringcat_engine::plan;
 
+use super::assignment;
 use super::difference::{Difference, DifferenceKind, Stated};
-use super::process_data::{self, Lengths};
+use super::process_data;
 
 /// A SubDevice of the file and the one that was found.
 pub(super) struct Both<'a> {
@@ -45,21 +48,8 @@ impl Both<'_> {
                 add(DifferenceKind::Mailbox, declared.declared.is_some(), text);
             }
         }
-        let mut unfit = process_data::unfit(declared, info);
-        let differences_of_pdos: Vec<(u8, String)> = process_data::pdos(declared)
-            .filter_map(|(sync_manager, pdo)| Some((sync_manager, pdo_difference(pdo, info)?)))
-            .collect();
-        for (sync_manager, text) in &differences_of_pdos {
-            add(DifferenceKind::Pdos, unfit.contains_key(sync_manager), text.clone());
-        }
-        unfit.retain(|sync_manager, _| !differences_of_pdos.iter().any(|(named, _)| named == sync_manager));
-        for (sync_manager, Lengths { declared, own }) in unfit {
-            let text = format!(
-                "SM {sync_manager}: expected a length of {declared}, got {own}: the PDOs of the SubDevice cannot be \
-                 written"
-            );
-            add(DifferenceKind::Pdos, true, text);
-        }
+        self.process_data(differences);
+        let mut add = |kind, prevents_op, text: String| differences.push(self.difference(kind, prevents_op, text));
         if let Err(error) = plan(declared, info) {
             add(DifferenceKind::ProcessData, true, error.to_string());
         }
@@ -98,6 +88,41 @@ impl Both<'_> {
         false
     }
 
+    /// Appends the differences of the process data, by SyncManager; of a SubDevice with modules only those of PDOs that
+    /// both describe.
+    fn process_data(&self, differences: &mut Vec<Difference>) {
+        let (declared, info) = (self.declared, self.info);
+        let is_modular = assignment::names_modules(declared) || self.stated.is_some_and(|stated| stated.modular);
+        let (mut unfit, assigned) = match is_modular {
+            true => Default::default(),
+            false => (process_data::unfit(declared, info), assignment::differences(declared, info)),
+        };
+        let mut named = BTreeSet::new();
+        let mut add = |sync_manager: u8, text: String, prevents_op: bool| {
+            named.insert(sync_manager);
+            differences.push(self.difference(DifferenceKind::Pdos, prevents_op, text));
+        };
+        let assigned_else: BTreeSet<u8> = assigned.iter().map(|(sync_manager, _)| *sync_manager).collect();
+        for (sync_manager, text) in assigned {
+            match unfit.get(&sync_manager) {
+                Some(lengths) => add(sync_manager, format!("{text}; {lengths}"), true),
+                None => add(sync_manager, text, false),
+            }
+        }
+        for (sync_manager, pdo) in process_data::pdos(declared) {
+            // One that the SubDevice does not describe is named with the assignment.
+            let may_lack = is_modular || assigned_else.contains(&sync_manager);
+            if let Some(text) = pdo_difference(pdo, info, may_lack) {
+                add(sync_manager, text, unfit.contains_key(&sync_manager));
+            }
+        }
+        unfit.retain(|sync_manager, _| !named.contains(sync_manager));
+        for (sync_manager, lengths) in unfit {
+            let text = format!("SM {sync_manager}: {lengths}");
+            differences.push(self.difference(DifferenceKind::Pdos, true, text));
+        }
+    }
+
     fn difference(&self, kind: DifferenceKind, prevents_op: bool, text: String) -> Difference {
         Difference {
             subdevice: Some(SubDeviceId(self.config)),
@@ -127,24 +152,32 @@ fn buffers(mailbox: Option<[(u16, u16); 2]>) -> String {
 }
 
 /// How a PDO differs from the one that the SubDevice describes. A SubDevice that describes no PDO at all has no
-/// difference: its dictionary was not read.
-fn pdo_difference(pdo: &PdoMapping, info: &SubDeviceInfo) -> Option<String> {
+/// difference: its dictionary was not read. `may_lack`: one that it does not describe is none.
+fn pdo_difference(pdo: &PdoMapping, info: &SubDeviceInfo, may_lack: bool) -> Option<String> {
     if info.pdos.is_empty() {
         return None;
     }
     let index = pdo.index;
     let Some(described) = info.pdo(index) else {
-        return Some(format!("PDO {index:#06x} is not among the {} that the SubDevice describes", info.pdos.len()));
+        let count = info.pdos.len();
+        return (!may_lack).then(|| format!("PDO {index:#06x} is not among the {count} that the SubDevice describes"));
     };
     let ours = pdo.entries.as_ref()?;
     let theirs: Vec<PdoEntry> = entries(described);
-    let at = (0..ours.len().max(theirs.len())).find(|at| ours.get(*at) != theirs.get(*at))?;
+    let mut others = (0..ours.len().max(theirs.len())).filter(|at| ours.get(*at) != theirs.get(*at));
+    let at = others.next()?;
+    let more = match others.count() {
+        0 => String::new(),
+        1 => "; 1 more entry differs".to_owned(),
+        count => format!("; {count} more entries differ"),
+    };
     let word = |entry: Option<&PdoEntry>| match entry {
         None => "nothing".to_owned(),
         Some(entry) if entry.index == 0 => format!("a gap of {} bits", entry.bit_length),
         Some(entry) => format!("{:#06x}:{:02x} of {} bits", entry.index, entry.sub_index, entry.bit_length),
     };
-    Some(format!("PDO {index:#06x}, entry {}: expected {}, got {}", at + 1, word(ours.get(at)), word(theirs.get(at))))
+    let (expected, got) = (word(ours.get(at)), word(theirs.get(at)));
+    Some(format!("PDO {index:#06x}, entry {}: expected {expected}, got {got}{more}", at + 1))
 }
 
 fn entries(described: &PdoInfo) -> Vec<PdoEntry> {

@@ -1,60 +1,100 @@
-//! SubDevices at another place than in the file. Two that are swapped are one difference, which names both.
+//! SubDevices at another place than in the file. Two that have changed places are one difference, which names both.
 
 use std::collections::BTreeMap;
 
-use ringcat_engine::config::ConfigAddress;
 use ringcat_engine::info::SubDeviceInfo;
 
 use super::align::{Place, position};
+use super::moves::{Move, moves};
 use crate::configuration::Configuration;
 
-/// The places of all SubDevices that were found.
+/// The places of the SubDevices that were found and are declared by position.
 pub(super) struct Order {
-    /// The place in the file and on the bus, and whether the first one is another one than the second; by declaration.
-    places: BTreeMap<usize, (ConfigAddress, usize, bool)>,
-    /// The declaration of each place in the file that is a position.
-    at: BTreeMap<usize, usize>,
+    /// Declarations in the order of their positions.
+    declared: Vec<Member>,
+    /// Indices of these, by declaration.
+    index: BTreeMap<usize, usize>,
+    /// Their changes.
+    moves: Vec<Option<Move>>,
+    /// Indices of `declared` in the order of the bus.
+    by_bus: Vec<usize>,
+}
+
+/// A SubDevice of the file that was found.
+#[derive(Clone, Copy)]
+struct Member {
+    config: usize,
+    /// Its position in the file.
+    file: usize,
+    /// Its position on the bus.
+    bus: usize,
 }
 
 impl Order {
     pub(super) fn of(configuration: &Configuration, found: &[SubDeviceInfo], places: &[Place]) -> Order {
         let configs = &configuration.declaration.subdevices;
-        let mut order = Order { places: BTreeMap::new(), at: BTreeMap::new() };
-        for place in places {
-            let Place::Both { config, info, moved } = *place else { continue };
-            order.places.insert(config, (configs[config].address, found[info].position.0.into(), moved));
-            if let place @ 0..=0xFFFF = position(&configs[config]) {
-                order.at.insert(place, config);
-            }
-        }
-        order
+        let member = |place: &Place| {
+            let Place::Both { config, info, .. } = *place else { return None };
+            let file = position(&configs[config]);
+            (file <= 0xFFFF).then(|| Member { config, file, bus: found[info].position.0.into() })
+        };
+        let mut declared: Vec<Member> = places.iter().filter_map(member).collect();
+        declared.sort_by_key(|member| member.file);
+        let index = declared.iter().enumerate().map(|(at, member)| (member.config, at)).collect();
+        let bus: Vec<usize> = declared.iter().map(|member| member.bus).collect();
+        let mut by_bus: Vec<usize> = (0..declared.len()).collect();
+        by_bus.sort_by_key(|at| bus[*at]);
+        Order { moves: moves(&bus), declared, index, by_bus }
     }
 
-    /// Where a SubDevice is, and where the file has it; `None` if it is there after all, or was named with the one that
-    /// it is swapped with.
+    /// Where a SubDevice is, and where the file has it; `None` if it was named with the one that it has changed places
+    /// with.
     pub(super) fn text(&self, config: usize, names: &[String]) -> Option<String> {
-        let (address, bus, _) = *self.places.get(&config)?;
-        if self.at.get(&bus) == Some(&config) {
+        let at = *self.index.get(&config)?;
+        let Member { file, bus, .. } = self.declared[at];
+        let name = &names[config];
+        let Some(Move::With(other)) = self.moves[at] else {
+            // The numbers may be the same by chance, where others are missing or additional before it.
+            if file == bus {
+                let (is, said) = (self.behind_on_bus(at, names), self.behind(at.checked_sub(1), names));
+                return Some(format!("\"{name}\" is {is}, the file has it {said}"));
+            }
+            return Some(format!("\"{name}\" is at position {bus}, the file has it at position {file}"));
+        };
+        if other < at {
             return None;
         }
-        let is = format!("\"{}\" is at position {bus}", names[config]);
-        let Some((other, moved)) = self.swapped_with(config) else {
-            return Some(format!("{is}, the file has it at {address}"));
-        };
-        let (other_address, other_bus, _) = *self.places.get(&other)?;
-        (!moved || config < other).then(|| {
+        let partner = self.declared[other];
+        let second = &names[partner.config];
+        Some(if (bus, partner.bus) == (partner.file, file) {
             format!(
-                "{is} instead of {address}, and \"{}\" at position {other_bus} instead of {other_address}",
-                names[other]
+                "\"{name}\" is at position {bus} instead of position {file}, and \"{second}\" at position {} instead \
+                 of position {}",
+                partner.bus, partner.file
+            )
+        } else {
+            format!(
+                "\"{name}\" and \"{second}\" have changed places: they are at positions {bus} and {}, the file has \
+                 them at positions {file} and {}",
+                partner.bus, partner.file
             )
         })
     }
 
-    /// The SubDevice that is at the place of this one and has its place on the bus, and whether it has moved too.
-    fn swapped_with(&self, config: usize) -> Option<(usize, bool)> {
-        let (_, bus, _) = *self.places.get(&config)?;
-        let other = *self.at.get(&bus)?;
-        let (_, other_bus, moved) = *self.places.get(&other)?;
-        (other != config && self.at.get(&other_bus) == Some(&config)).then_some((other, moved))
+    /// The one that a SubDevice has changed places with.
+    pub(super) fn other(&self, config: usize) -> Option<usize> {
+        match self.moves[*self.index.get(&config)?] {
+            Some(Move::With(other)) => Some(self.declared[other].config),
+            _ => None,
+        }
+    }
+
+    fn behind_on_bus(&self, at: usize, names: &[String]) -> String {
+        let own = self.by_bus.iter().position(|other| *other == at);
+        self.behind(own.and_then(|own| own.checked_sub(1)).map(|before| self.by_bus[before]), names)
+    }
+
+    fn behind(&self, at: Option<usize>, names: &[String]) -> String {
+        at.map_or_else(|| "before all".to_owned(), |at| format!("behind \"{}\"", names[self.declared[at].config]))
     }
 }

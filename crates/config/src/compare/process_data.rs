@@ -3,6 +3,7 @@
 //! length of a SyncManager is another one.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use ringcat_engine::config::{PdoMapping, SdoDownload, StartupAction, SubDeviceConfig};
 use ringcat_engine::info::SubDeviceInfo;
@@ -15,6 +16,13 @@ pub(super) struct Lengths {
     pub(super) declared: u16,
     /// The one that the SubDevice has.
     pub(super) own: u16,
+}
+
+impl fmt::Display for Lengths {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Lengths { declared, own } = self;
+        write!(f, "expected a length of {declared}, got {own}: the PDOs of the SubDevice cannot be written")
+    }
 }
 
 /// The SyncManagers whose length stays another one than declared.
@@ -86,7 +94,7 @@ fn held_bytes(
 }
 
 /// Whether a start-up command writes an assignment or a mapping.
-fn writes_pdos(action: &StartupAction) -> bool {
+pub(super) fn writes_pdos(action: &StartupAction) -> bool {
     let StartupAction::Sdo(SdoDownload { index, .. }) = action else { return false };
     matches!(index, 0x1600..=0x17FF | 0x1A00..=0x1BFF | 0x1C10..=0x1C2F)
 }

@@ -101,6 +101,7 @@ impl NetworkFile {
                 [(mailbox.write.start, mailbox.write.length), (mailbox.read.start, mailbox.read.length)]
             }),
             firmware: subdevice.firmware.clone(),
+            modular: false,
         };
         self.subdevice.iter().map(stated).collect()
     }

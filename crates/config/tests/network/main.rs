@@ -3,6 +3,7 @@
 
 mod bad_files;
 mod differences;
+mod generated;
 mod reading;
 
 /// A file with all keys, in canonical form.

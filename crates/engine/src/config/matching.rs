@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use super::resolution::{ConfigError, Resolution};
-use super::resolve::step;
+use super::steps::step;
 use super::{ConfigAddress, IdentityMismatch, SubDeviceConfig};
 use crate::info::SubDeviceInfo;
 use crate::order::InOrder;

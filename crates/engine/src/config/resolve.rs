@@ -10,6 +10,7 @@ use ringcat_wire::address::Position;
 use super::groups::{self, groups};
 use super::matching::{Marked, at_place, missing_error};
 use super::resolution::{ConfigError, Resolution};
+use super::steps::step;
 use super::{ConfigAddress, SubDeviceConfig};
 use crate::declared::SubDeviceId;
 use crate::info::SubDeviceInfo;
@@ -202,29 +203,4 @@ fn claim(mut resolutions: Vec<Resolution>, infos: &[&SubDeviceInfo]) -> Vec<Reso
     let extra = owners.iter().enumerate().filter(|(_, owner)| owner.is_none());
     resolutions.extend(extra.map(|(info, _)| Resolution::Extra { info }));
     resolutions
-}
-
-/// Counts the work in tests: it has to grow as the networks do.
-#[inline]
-pub(super) fn step() {
-    #[cfg(test)]
-    steps::count();
-}
-
-#[cfg(test)]
-pub(super) mod steps {
-    use core::cell::Cell;
-
-    std::thread_local! {
-        static STEPS: Cell<usize> = const { Cell::new(0) };
-    }
-
-    pub fn count() {
-        STEPS.set(STEPS.get() + 1);
-    }
-
-    /// The steps of this thread so far.
-    pub fn so_far() -> usize {
-        STEPS.get()
-    }
 }

@@ -238,11 +238,11 @@ fn steps(number: u16, declare: impl Fn(u16) -> SubDeviceConfig) -> usize {
         (info.alias, info.identification) = (mark, Some(mark));
     }
     let configs: Vec<SubDeviceConfig> = (0..number).map(declare).collect();
-    let before = super::resolve::steps::so_far();
+    let before = super::steps::so_far();
     let resolutions = resolve(&configs, &infos);
     let all_found = (0..number.into()).map(|at| found(at, at));
     assert!(resolutions.into_iter().eq(all_found));
-    super::resolve::steps::so_far() - before
+    super::steps::so_far() - before
 }
 
 // covers: declaration

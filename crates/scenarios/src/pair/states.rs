@@ -49,7 +49,7 @@ impl States {
             let allowed = watchdog_ns(is);
             let name = device.0;
             assert!(
-                silent + DAMAGED_NS >= allowed,
+                silent.saturating_add(DAMAGED_NS) >= allowed,
                 "device {name} leaves OP for {to} ({}) after {silent} ns without outputs, watchdog {allowed}",
                 is.al_status_code()
             );

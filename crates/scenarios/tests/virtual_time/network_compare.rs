@@ -76,9 +76,7 @@ fn with(at: usize, kind: &str) -> Vec<&str> {
 fn an_additional_subdevice_prevents_op_where_it_moves_declared_positions() {
     let network = file_of(&BUS, |_| ());
     assert_eq!(kinds(&judged(&network, &BUS)), []);
-    let of_places = |differences: Vec<Difference>| -> Vec<(DifferenceKind, bool)> {
-        kinds(&differences).into_iter().filter(|(kind, _)| *kind != Cable).collect()
-    };
+    let of_places = |differences: Vec<Difference>| kinds(&differences);
     for (at, prevents) in [(0, true), (1, true), (3, true), (4, false)] {
         assert_eq!(of_places(judged(&network, &with(at, "digital-input-8"))), [(Additional, prevents)], "{at}");
     }
@@ -184,6 +182,11 @@ fn swapped_subdevices_are_one_difference_that_names_both_places() {
     let differences = judged(&network, &["coupler", "analog-input-4", "servo", "digital-output-8"]);
     assert_eq!(kinds(&differences), [(Order, true)]);
     assert_eq!(differences[0].text, "\"digital-output-8\" is at position 3, the file has it at position 1");
+    let differences = judged(&network, &["digital-output-8", "servo", "analog-input-4"]);
+    assert_eq!(kinds(&differences), [(Missing, true), (Order, true)], "{differences:#?}");
+    let text = "\"analog-input-4\" and \"servo\" have changed places: they are at positions 2 and 1, the file has them \
+                at positions 2 and 3";
+    assert_eq!(differences[1].text, text);
     let optional = file_of(&BUS, |file| file.subdevice[OUTPUTS].optional = true);
     assert!(!kinds(&judged(&optional, &["coupler", "analog-input-4", "servo", "digital-output-8"]))[0].1);
 }
@@ -234,6 +237,10 @@ fn pdos_that_differ_prevent_op_where_they_cannot_be_written() {
     let other: fn(&mut Vec<Entry>) = |entries| entries[0].index += 1;
     assert_eq!(kinds(&judged(&entries(OUTPUTS, other), &BUS)), [(Pdos, false)]);
     assert_eq!(kinds(&judged(&entries(ANALOG, other), &BUS)), [(Pdos, false)]);
+    let two: fn(&mut Vec<Entry>) = |entries| entries.iter_mut().take(2).for_each(|entry| entry.index += 1);
+    let differences = judged(&entries(ANALOG, two), &BUS);
+    assert_eq!(kinds(&differences), [(Pdos, false)]);
+    assert!(differences[0].text.ends_with("; 1 more entry differs"), "{}", differences[0].text);
     // The mapping is written.
     let shorter: fn(&mut Vec<Entry>) = |entries| drop(entries.pop());
     assert_eq!(kinds(&judged(&entries(DRIVE, shorter), &BUS)), [(Pdos, false)]);
@@ -251,8 +258,25 @@ fn pdos_that_are_left_out_prevent_op_where_the_assignment_cannot_be_written() {
     };
     let differences = judged(&left(1, 8), &types);
     assert_eq!(kinds(&differences), [(Pdos, true)], "{differences:#?}");
-    assert!(differences[0].text.contains("SM 0: expected a length of 1, got 2"), "{}", differences[0].text);
-    assert_eq!(kinds(&judged(&left(2, 3), &types)), [], "it is written");
+    assert!(differences[0].text.contains("; expected a length of 1, got 2"), "{}", differences[0].text);
+    assert_eq!(kinds(&judged(&left(2, 3), &types)), [(Pdos, false)], "it is written");
+}
+
+/// A SyncManager that only the file leaves out keeps its PDOs; a file without any leaves all to the SubDevice.
+// covers: network-file
+#[test]
+fn a_syncmanager_that_the_file_leaves_out_is_a_difference_unless_all_are() {
+    let without = |at: usize, kept: usize| {
+        let change = |file: &mut NetworkFile| file.subdevice[at].sync_manager.truncate(kept);
+        judged(&file_of(&BUS, change), &BUS)
+    };
+    for (at, count) in [(DRIVE, 2), (ANALOG, 1)] {
+        for kept in 0..count {
+            let expected: &[_] = if kept == 0 { &[] } else { &[(Pdos, false)] };
+            let differences = without(at, kept);
+            assert_eq!(kinds(&differences), expected, "{at}, {kept}: {differences:#?}");
+        }
+    }
 }
 
 // covers: network-file

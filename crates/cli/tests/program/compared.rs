@@ -1,0 +1,89 @@
+//! `ringcat compare` of networks whose devices have descriptions: other PDOs, modules.
+
+use std::fs;
+
+use crate::files::{ACME, Place, Said, ringcat};
+
+/// A text without line breaks.
+fn folded(said: &Said) -> String {
+    said.out.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// The descriptions, changed by a function, with their modules.
+fn descriptions(place: &Place, change: impl Fn(&str) -> String) -> String {
+    fs::create_dir(place.path("modules")).expect("it is ours");
+    let modules = fs::read_to_string(format!("{ACME}/modules/acme-modules.xml")).expect("it is ours");
+    place.write("modules/acme-modules.xml", &modules);
+    let text = fs::read_to_string(format!("{ACME}/acme.xml")).expect("it is ours");
+    let changed = change(&text);
+    place.write("acme.xml", &changed)
+}
+
+// covers: network-file
+#[test]
+fn another_assignment_of_a_device_with_coe_is_named_in_both_directions() {
+    let place = Place::new("assignment");
+    let acme = descriptions(&place, str::to_owned);
+    let bus = place.write("bus.toml", "[[device]]\nesi = \"acme.xml\"\ntype = \"AA02\"\n");
+    let out = place.path("machine.toml");
+    let compare = |choices: &[&str]| {
+        let declare = [&["esi", "declare", &acme, "--type", "AA02", "--overwrite", "--out", &out], choices].concat();
+        assert_eq!(ringcat(&declare).code, Some(0));
+        ringcat(&["compare", "--sim", &bus, "--network", &out])
+    };
+    let same = compare(&[]);
+    assert_eq!(same.verdict(), "result: ok: 1 SubDevice, as in the file", "{}", same.all());
+    for (choices, expected) in [
+        (&["--without", "0x1A00"][..], "SM 3: PDO 0x1a00 \"AI Standard Channel 1\" is assigned, but not in the file"),
+        (&["--without", "0x1A00", "--with", "0x1A01"], "SM 3: expected PDO 0x1a01 \"AI Compact Channel 1\", got"),
+    ] {
+        let differs = compare(choices);
+        assert!(folded(&differs).contains(expected), "{choices:?}: {}", differs.all());
+        let verdict = "result: FAILED: 1 difference from the file, 0 of them prevent OP";
+        assert_eq!(differs.verdict(), verdict, "{}", differs.all());
+    }
+    let text = fs::read_to_string(&acme).expect("it is ours");
+    place.write("fewer.xml", &text.replacen("<TxPdo Fixed=\"1\" Sm=\"3\">", "<TxPdo Fixed=\"1\">", 1));
+    let fewer = place.write("fewer.toml", "[[device]]\nesi = \"fewer.xml\"\ntype = \"AA02\"\n");
+    compare(&[]);
+    let differs = ringcat(&["compare", "--sim", &fewer, "--network", &out]);
+    let expected = "SM 3: PDO 0x1a00 \"AI Standard Channel 1\" is in the file, but not assigned";
+    assert!(folded(&differs).contains(expected) && !differs.out.contains('!'), "{}", differs.all());
+}
+
+/// The EEPROM of a device with slots lists the PDOs of its head; those of its modules are no differences.
+// covers: network-file, ES-69
+#[test]
+fn pdos_of_modules_that_the_eeprom_cannot_list_are_no_differences() {
+    let place = Place::new("of-modules");
+    let head = "<TxPdo Fixed=\"1\" Sm=\"3\"><Index>#x1BF0</Index><Name>Head</Name><Entry><Index>#xF100</Index>\
+                <SubIndex>1</SubIndex><BitLen>16</BitLen><Name>State</Name><DataType>UINT</DataType></Entry></TxPdo>\
+                <Mailbox DataLinkLayer=\"1\"><EoE IP=\"1\" MAC=\"1\"/>";
+    let acme = descriptions(&place, |text| {
+        text.replace("<Mailbox DataLinkLayer=\"1\"><EoE IP=\"1\" MAC=\"1\"/>", head)
+            .replace(" DownloadModuleIdentList=\"1\"", "")
+    });
+    place.write(
+        "listed.xml",
+        &fs::read_to_string(&acme)
+            .expect("it is ours")
+            .replace("MaxSlotCount=\"4\"", "MaxSlotCount=\"4\" DownloadModuleIdentList=\"1\""),
+    );
+    for file in ["acme.xml", "listed.xml"] {
+        let device = format!("[[device]]\nesi = \"{file}\"\ntype = \"AM01\"\nmodules = [\"csp axis\"]\n");
+        let (bus, out) = (place.write("bus.toml", &device), place.path("machine.toml"));
+        let declare = ["--type", "AM01", "--module", "csp axis", "--overwrite", "--out", &out];
+        let declared = ringcat(&[&["esi", "declare", &place.path(file)], &declare[..]].concat());
+        assert_eq!(declared.code, Some(0), "{}", declared.all());
+        assert_eq!(place.read("machine.toml").contains("0xf030"), file == "listed.xml");
+        // Without commands that name the modules: the object that lists them, or else the description.
+        let text = place.read("machine.toml");
+        let end = text.find("[[subdevice.startup]]").unwrap_or(text.len());
+        let bare = place.write("bare.toml", &text[..end]);
+        let esi: &[&str] = if file == "listed.xml" { &[] } else { &["--esi", &acme] };
+        for network in [&out, &bare] {
+            let same = ringcat(&[&["compare", "--sim", &bus, "--network", network], esi].concat());
+            assert_eq!(same.verdict(), "result: ok: 1 SubDevice, as in the file", "{file}: {}", same.all());
+        }
+    }
+}

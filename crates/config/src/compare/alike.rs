@@ -1,0 +1,93 @@
+//! How much a found SubDevice is a declared one: its device, and the identity that the file demands.
+
+use std::collections::BTreeMap;
+
+use ringcat_engine::config::SubDeviceConfig;
+use ringcat_engine::info::SubDeviceInfo;
+
+use super::difference::Stated;
+
+/// Degree of a SubDevice that has all that the file demands: more than any sum of those of one device, of which a
+/// sequence has at most 4,096.
+pub(super) const OWN: u32 = 1 << 13;
+/// Degree of a SubDevice of the same device that the file refuses, as one of another serial number.
+const SAME_DEVICE: u32 = 1;
+
+/// Vendor, product, serial number.
+type Unit = (u32, u32, u32);
+
+/// Both sides.
+pub(super) struct Alike<'a> {
+    configs: &'a [SubDeviceConfig],
+    found: &'a [SubDeviceInfo],
+    stated: &'a [Stated],
+    /// The first SubDevice of each unit that the file demands.
+    found_units: BTreeMap<Unit, usize>,
+    /// The units that the file demands.
+    declared_units: BTreeMap<Unit, usize>,
+}
+
+impl<'a> Alike<'a> {
+    pub(super) fn new(configs: &'a [SubDeviceConfig], found: &'a [SubDeviceInfo], stated: &'a [Stated]) -> Alike<'a> {
+        let declared =
+            (0..configs.len()).filter_map(|config| Some((unit(&configs[config], stated.get(config))?, config)));
+        let declared_units: BTreeMap<Unit, usize> = declared.collect();
+        let units = found.iter().enumerate().rev().map(|(info, it)| (unit_of(it), info));
+        let found_units = units.filter(|(unit, _)| declared_units.contains_key(unit)).collect();
+        Alike { configs, found, stated, found_units, declared_units }
+    }
+
+    /// 0: another device, or one of which the other side has the serial number elsewhere.
+    pub(super) fn degree(&self, config: usize, info: usize) -> u32 {
+        let declared = &self.configs[config];
+        if !is_device(declared, self.stated.get(config), &self.found[info]) {
+            return 0;
+        }
+        match declared.expected.mismatch(&self.found[info]) {
+            None => OWN,
+            Some(_) if self.is_claimed(config, info) => 0,
+            Some(_) => SAME_DEVICE,
+        }
+    }
+
+    /// Whether one of both has a serial number that the other side has elsewhere.
+    pub(super) fn is_claimed(&self, config: usize, info: usize) -> bool {
+        let (demanded, own) = (unit(&self.configs[config], self.stated.get(config)), unit_of(&self.found[info]));
+        demanded != Some(own)
+            && (demanded.is_some_and(|unit| self.found_units.contains_key(&unit))
+                || self.declared_units.contains_key(&own))
+    }
+
+    /// Where the serial number that the file demands was found.
+    pub(super) fn serial_at(&self, config: usize) -> Option<usize> {
+        self.found_units.get(&unit(&self.configs[config], self.stated.get(config))?).copied()
+    }
+}
+
+fn unit(declared: &SubDeviceConfig, stated: Option<&Stated>) -> Option<Unit> {
+    let stated = stated.and_then(|stated| stated.device);
+    let vendor = declared.expected.vendor_id.or(stated.map(|device| device.0))?;
+    let product = declared.expected.product_code.or(stated.map(|device| device.1))?;
+    Some((vendor, product, declared.expected.serial?))
+}
+
+const fn unit_of(info: &SubDeviceInfo) -> Unit {
+    (info.identity.vendor_id, info.identity.product_code, info.identity.serial)
+}
+
+/// Vendor and product; `None`: any.
+pub(super) type DeviceKey = (Option<u32>, Option<u32>);
+
+/// Vendor and product of a declared SubDevice.
+pub(super) fn device(config: &SubDeviceConfig, stated: Option<&Stated>) -> DeviceKey {
+    let stated = stated.and_then(|stated| stated.device);
+    let vendor = config.expected.vendor_id.or(stated.map(|device| device.0));
+    (vendor, config.expected.product_code.or(stated.map(|device| device.1)))
+}
+
+/// Whether a found SubDevice has the vendor and the product of a declared one.
+pub(super) fn is_device(config: &SubDeviceConfig, stated: Option<&Stated>, info: &SubDeviceInfo) -> bool {
+    let (vendor, product) = device(config, stated);
+    vendor.is_none_or(|vendor| vendor == info.identity.vendor_id)
+        && product.is_none_or(|product| product == info.identity.product_code)
+}

@@ -1,0 +1,106 @@
+//! The PDOs that a SubDevice assigns to its SyncManagers by its SII, compared with those that a file assigns.
+//!
+//! The MainDevice writes the assignment where it can (protocol 5.2). A file that says nothing leaves it to the
+//! SubDevice: that is no difference.
+
+use std::collections::BTreeMap;
+
+use ringcat_engine::config::{StartupAction, SubDeviceConfig};
+use ringcat_engine::info::SubDeviceInfo;
+use ringcat_engine::plan;
+
+use super::process_data;
+
+/// Objects with the modules that are configured and detected (ETG.5001.1).
+const MODULES: [u16; 2] = [0xF030, 0xF050];
+/// PDOs that a message lists.
+const LISTED: usize = 8;
+
+/// Whether start-up commands name the modules in the slots of a SubDevice: its SII cannot list their PDOs.
+pub(super) fn names_modules(declared: &SubDeviceConfig) -> bool {
+    declared.startup.iter().any(|command| match &command.action {
+        StartupAction::Sdo(download) => MODULES.contains(&download.index),
+        StartupAction::Upload(upload) => MODULES.contains(&upload.index),
+        _ => false,
+    })
+}
+
+/// The SyncManagers with another assignment, each with one text; none where the file cannot be planned, which has a
+/// reason of its own.
+pub(super) fn differences(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> Vec<(u8, String)> {
+    let wanted = wanted(declared);
+    let is_silent = wanted.values().all(|pdos| pdos.as_ref().is_none_or(Vec::is_empty)) && declared.declared.is_some();
+    if info.pdos.is_empty() || wanted.is_empty() || is_silent {
+        return Vec::new();
+    }
+    let (Ok(own), Ok(_)) = (plan(&SubDeviceConfig::from_info(info), info), plan(declared, info)) else {
+        return Vec::new();
+    };
+    let writes_pdos = declared.startup.iter().any(|command| process_data::writes_pdos(&command.action));
+    let mut differences = Vec::new();
+    for area in &own.process_data {
+        let got: Vec<u16> = area.pdos.iter().map(|pdo| pdo.index).collect();
+        // With a length and without PDOs, the SII says nothing about them.
+        if got.is_empty() && area.length > 0 {
+            continue;
+        }
+        let number = area.sync_manager;
+        let expected = match wanted.get(&number) {
+            Some(Some(pdos)) => &pdos[..],
+            Some(None) => continue,
+            None if writes_pdos => continue,
+            None => &[],
+        };
+        differences.extend(text(expected, &got, info).map(|text| (number, format!("SM {number}: {text}"))));
+    }
+    differences
+}
+
+/// The PDOs of each SyncManager of the file; `None` where it has a length only.
+fn wanted(declared: &SubDeviceConfig) -> BTreeMap<u8, Option<Vec<u16>>> {
+    let mut wanted = BTreeMap::new();
+    if let Some(declared) = &declared.declared {
+        for it in declared {
+            let Some(area) = it.area() else { continue };
+            let is_known = area.length == 0 || !it.pdos.is_empty();
+            wanted.insert(it.index, is_known.then(|| it.pdos.iter().map(|pdo| pdo.index).collect()));
+        }
+        return wanted;
+    }
+    for it in declared.pdos.iter().flatten() {
+        wanted.insert(it.sync_manager, Some(it.pdos.iter().map(|pdo| pdo.index).collect()));
+    }
+    wanted
+}
+
+/// How two assignments differ, with the PDOs that the SubDevice does not describe.
+fn text(expected: &[u16], got: &[u16], info: &SubDeviceInfo) -> Option<String> {
+    let without = |these: &[u16], others: &[u16]| -> Vec<u16> {
+        these.iter().copied().filter(|index| !others.contains(index)).collect()
+    };
+    let (missing, more) = (without(expected, got), without(got, expected));
+    let text = match (&missing[..], &more[..]) {
+        ([], []) => {
+            let at = (0..got.len().max(expected.len())).find(|at| expected.get(*at) != got.get(*at))?;
+            let word = |pdos: &[u16]| pdos.get(at).map_or_else(|| "none".to_owned(), |index| list(&[*index]));
+            format!("expected {} at place {} of the assignment, got {}", word(expected), at + 1, word(got))
+        }
+        ([], more) => format!("{} assigned, but not in the file", with_verb(more)),
+        (missing, []) => format!("{} in the file, but not assigned", with_verb(missing)),
+        (missing, more) => format!("expected {}, got {}", list(missing), list(more)),
+    };
+    let unknown: Vec<u16> = missing.into_iter().filter(|index| info.pdo(*index).is_none()).collect();
+    Some(if unknown.is_empty() { text } else { format!("{text}; the SubDevice does not describe {}", list(&unknown)) })
+}
+
+fn with_verb(pdos: &[u16]) -> String {
+    format!("{} {}", list(pdos), if pdos.len() == 1 { "is" } else { "are" })
+}
+
+fn list(pdos: &[u16]) -> String {
+    let listed: Vec<String> = pdos.iter().take(LISTED).map(|index| format!("PDO {index:#06x}")).collect();
+    match pdos.len().saturating_sub(LISTED) {
+        0 => listed.join(", "),
+        more => format!("{} and {more} more", listed.join(", ")),
+    }
+}
