@@ -9,8 +9,8 @@ use crate::esi::{self, Device, Dictionary, Object, PartsRoom, PlacedModule, part
 impl SubDevice {
     /// Fills in the names and types of PDOs and entries that it does not have, in `language`, an LcId: those of the PDO
     /// in the description or in a module, else those of the object in its dictionary. `modules` are those in the slots
-    /// of the device ([`esi::detected_modules`]). A PDO with the entries of a description that fixes them is fixed. Returns
-    /// how many names were filled in.
+    /// of the device ([`esi::detected_modules`]). A PDO with the entries of a description that fixes them is fixed.
+    /// Returns how many names were filled in.
     pub fn name_from_esi(&mut self, device: &Device, modules: &[PlacedModule<'_>], language: u32) -> usize {
         let of_modules: Vec<(esi::Pdo, String)> = modules.iter().flat_map(|placed| pdos_of(placed, language)).collect();
         let mut named = 0;

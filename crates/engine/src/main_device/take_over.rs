@@ -97,9 +97,9 @@ impl MainDevice {
         self.standby.as_mut()?.collision.as_mut()?.source.take()
     }
 
-    /// The exchange goes on with the process data of the other MainDevice, or with its own. The SubDevices stay as they are: none goes
-    /// through INIT, no address and no register of SyncManagers or FMMUs is written. What was known is compared with
-    /// the segment meanwhile; the first mail of each mailbox is as after a crash of its owner.
+    /// The exchange goes on with the process data of the other MainDevice, or with its own. The SubDevices stay as they
+    /// are: none goes through INIT, no address and no register of SyncManagers or FMMUs is written. What was known is
+    /// compared with the segment meanwhile; the first mail of each mailbox is as after a crash of its owner.
     fn take_over(&mut self) {
         let events = self.supervisor.take_events();
         // The mirror of the other MainDevice ends.

@@ -173,9 +173,9 @@ impl BringUp<'_> {
     }
 
     /// Commands of PS around PDO assignment and mapping, watchdog, process data SyncManagers, FMMUs, SAFEOP (protocol
-    /// 5.2). As soon as its FMMUs are set a SubDevice may process outputs and inputs, at different times. Its share of a
-    /// working counter is expected only after it has delivered its inputs, so that the inputs of the others stay fresh
-    /// meanwhile.
+    /// 5.2). As soon as its FMMUs are set a SubDevice may process outputs and inputs, at different times. Its share of
+    /// a working counter is expected only after it has delivered its inputs, so that the inputs of the others stay
+    /// fresh meanwhile.
     async fn safeop(&self) -> Result<(), ConfigureError> {
         let plan = &self.setup.plan;
         self.command_pdos(false).await?;

@@ -16,17 +16,20 @@ const SEGMENT: &str = "[[device]]\nesi = \"acme.xml\"\ntype = \"AA02\"\nserial =
 /// Data types of more objects of the analogue terminal.
 const TYPES: &str = r#"
 <DataType><Name>DT1018</Name><BitSize>144</BitSize>
- <SubItem><SubIdx>0</SubIdx><Name>SubIndex 000</Name><Type>USINT</Type><BitSize>8</BitSize><BitOffs>0</BitOffs></SubItem>
+ <SubItem><SubIdx>0</SubIdx><Name>SubIndex 000</Name><Type>USINT</Type>
+   <BitSize>8</BitSize><BitOffs>0</BitOffs></SubItem>
  <SubItem><SubIdx>1</SubIdx><Name>Maker</Name><Type>UDINT</Type><BitSize>32</BitSize><BitOffs>16</BitOffs></SubItem>
  <SubItem><SubIdx>4</SubIdx><Name>Number</Name><Type>UDINT</Type><BitSize>32</BitSize><BitOffs>112</BitOffs></SubItem>
 </DataType>
 <DataType><Name>DT1C00ARR</Name><BaseType>USINT</BaseType><BitSize>32</BitSize>
  <ArrayInfo><LBound>1</LBound><Elements>4</Elements></ArrayInfo></DataType>
 <DataType><Name>DT1C00</Name><BitSize>48</BitSize>
- <SubItem><SubIdx>0</SubIdx><Name>SubIndex 000</Name><Type>USINT</Type><BitSize>8</BitSize><BitOffs>0</BitOffs></SubItem>
+ <SubItem><SubIdx>0</SubIdx><Name>SubIndex 000</Name><Type>USINT</Type>
+   <BitSize>8</BitSize><BitOffs>0</BitOffs></SubItem>
  <SubItem><Name>Elements</Name><Type>DT1C00ARR</Type><BitSize>32</BitSize><BitOffs>16</BitOffs></SubItem></DataType>
 <DataType><Name>DT1A00</Name><BitSize>48</BitSize>
- <SubItem><SubIdx>0</SubIdx><Name>SubIndex 000</Name><Type>USINT</Type><BitSize>8</BitSize><BitOffs>0</BitOffs></SubItem>
+ <SubItem><SubIdx>0</SubIdx><Name>SubIndex 000</Name><Type>USINT</Type>
+   <BitSize>8</BitSize><BitOffs>0</BitOffs></SubItem>
  <SubItem><SubIdx>1</SubIdx><Name>First</Name><Type>UDINT</Type><BitSize>32</BitSize><BitOffs>16</BitOffs></SubItem>
 </DataType>
 <DataType><Name>BIT2</Name><BitSize>2</BitSize></DataType>
@@ -35,7 +38,8 @@ const TYPES: &str = r#"
 <DataType><Name>EN2</Name><BaseType>USINT</BaseType><BitSize>3</BitSize></DataType>
 <DataType><Name>EN3</Name><BitSize>5</BitSize></DataType>
 <DataType><Name>DT8020</Name><BitSize>40</BitSize>
- <SubItem><SubIdx>0</SubIdx><Name>SubIndex 000</Name><Type>USINT</Type><BitSize>8</BitSize><BitOffs>0</BitOffs></SubItem>
+ <SubItem><SubIdx>0</SubIdx><Name>SubIndex 000</Name><Type>USINT</Type>
+   <BitSize>8</BitSize><BitOffs>0</BitOffs></SubItem>
  <SubItem><SubIdx>1</SubIdx><Name>Two</Name><Type>BIT2</Type><BitSize>2</BitSize><BitOffs>16</BitOffs></SubItem>
  <SubItem><SubIdx>2</SubIdx><Name>Three</Name><Type>EN1</Type><BitSize>3</BitSize><BitOffs>18</BitOffs></SubItem>
  <SubItem><SubIdx>3</SubIdx><Name>Of a byte</Name><Type>EN2</Type><BitSize>3</BitSize><BitOffs>21</BitOffs></SubItem>
@@ -45,12 +49,14 @@ const TYPES: &str = r#"
 <DataType><Name>DT8030ARR</Name><BaseType>BOOL</BaseType><BitSize>3</BitSize>
  <ArrayInfo><LBound>1</LBound><Elements>3</Elements></ArrayInfo></DataType>
 <DataType><Name>DT8030</Name><BitSize>19</BitSize>
- <SubItem><SubIdx>0</SubIdx><Name>SubIndex 000</Name><Type>USINT</Type><BitSize>8</BitSize><BitOffs>0</BitOffs></SubItem>
+ <SubItem><SubIdx>0</SubIdx><Name>SubIndex 000</Name><Type>USINT</Type>
+   <BitSize>8</BitSize><BitOffs>0</BitOffs></SubItem>
  <SubItem><Name>Elements</Name><Type>DT8030ARR</Type><BitSize>3</BitSize><BitOffs>16</BitOffs></SubItem></DataType>
 <DataType><Name>DT8040ARR</Name><BaseType>BIT2</BaseType><BitSize>4</BitSize>
  <ArrayInfo><LBound>1</LBound><Elements>2</Elements></ArrayInfo></DataType>
 <DataType><Name>DT8040</Name><BitSize>20</BitSize>
- <SubItem><SubIdx>0</SubIdx><Name>SubIndex 000</Name><Type>USINT</Type><BitSize>8</BitSize><BitOffs>0</BitOffs></SubItem>
+ <SubItem><SubIdx>0</SubIdx><Name>SubIndex 000</Name><Type>USINT</Type>
+   <BitSize>8</BitSize><BitOffs>0</BitOffs></SubItem>
  <SubItem><Name>Elements</Name><Type>DT8040ARR</Type><BitSize>4</BitSize><BitOffs>16</BitOffs></SubItem></DataType>
 "#;
 

@@ -10,8 +10,8 @@ use crate::network::model::{Pdo, Protocol, SubDevice};
 const ASSIGNMENT: u16 = 0x1C10;
 
 /// Puts them between the start-up commands of the file before the PDOs and those behind, as the engine sends them,
-/// unless the file has some of its own. Where an ENI cannot have this order, they are directly behind the other commands of
-/// CoE: false.
+/// unless the file has some of its own. Where an ENI cannot have this order, they are directly behind the other
+/// commands of CoE: false.
 pub(super) fn place(startup: &mut Vec<StartupCommand>, of: &SubDevice) -> bool {
     let commands = commands(startup, of);
     if commands.is_empty() {
