@@ -118,7 +118,7 @@ fn a_killed_active_is_taken_over_and_comes_back_and_no_subdevice_leaves_op() {
     pair.bench.show_simulator_lateness();
 }
 
-// covers: standby, MR-21
+// covers: standby, MR-21, REQ012
 #[test]
 fn a_stopped_active_is_off_before_the_other_takes_over_and_ends_when_it_goes_on() {
     let Some(pair) = Pair::new() else { return };
@@ -158,7 +158,7 @@ fn an_active_that_loses_all_its_cables_yields_and_follows_when_they_are_back() {
     pair.bench.show_simulator_lateness();
 }
 
-// covers: standby, MR-09, MR-10, MR-24, REQ016
+// covers: standby, MR-09, MR-10, MR-24, REQ016, REQ048
 #[test]
 fn of_two_controllers_that_each_have_half_the_ring_one_yields_when_it_is_mended() {
     let Some(pair) = Pair::new() else { return };

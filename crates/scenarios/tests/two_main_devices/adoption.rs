@@ -73,7 +73,7 @@ fn a_takeover_writes_no_register_that_a_configuration_writes() {
     assert!(!written.is_empty(), "mailboxes are written");
 }
 
-// covers: MR-16, MR-17, REQ042, 9.9, standby
+// covers: MR-16, MR-17, 9.9, standby
 #[test]
 fn after_a_takeover_of_33_subdevices_the_first_sdo_is_answered_within_20_ms() {
     let mut two = taken_over(33);

@@ -68,7 +68,7 @@ fn gap_after(pair: &mut Pair, death: Death, phase: u32) -> Duration {
     pair.take_longest_gap()
 }
 
-// covers: standby, MR-07, MR-16, MR-18, MR-21, REQ005, REQ012, REQ025, 9.9
+// covers: standby, MR-07, MR-16, MR-18, MR-21, REQ005, 9.9
 #[test]
 fn an_active_that_dies_is_followed_by_the_other_one_within_the_time_out() {
     let mut table = String::new();
@@ -174,7 +174,7 @@ fn of_two_that_are_active_one_yields_within_two_cycles_and_no_cycle_is_lost() {
     }
 }
 
-// covers: standby, MR-27, REQ035
+// covers: standby, MR-27
 #[test]
 fn an_active_that_becomes_inactive_leaves_the_bus_to_the_time_out_of_the_other_one() {
     let mut pair = Pair::of_members(6, ring_of_two(8, Host::First));

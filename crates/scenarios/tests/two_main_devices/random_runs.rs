@@ -290,7 +290,7 @@ fn run_all(seeds: impl IntoIterator<Item = u64>) {
     seeds.into_iter().for_each(run);
 }
 
-// covers: standby, MR-07, MR-08, MR-10, MR-18, MR-25, MR-26, REQ005, REQ012, REQ015
+// covers: standby, MR-07, MR-08, MR-10, MR-18, MR-25, MR-26, REQ005, REQ015
 #[test]
 fn seeds_0_to_20_hold_under_faults_of_both_maindevices_and_the_cables() {
     run_all(0..20);

@@ -25,7 +25,7 @@ fn an_inactive_learns_what_it_needs_and_follows_without_a_frame_of_its_own() {
     }
 }
 
-// covers: MR-07, MR-16, MR-18, REQ005, REQ025, standby
+// covers: MR-07, MR-16, MR-18, REQ005, standby
 #[test]
 fn a_takeover_leaves_all_subdevices_in_op_and_no_output_goes_back() {
     for near in [Host::First, Host::Second] {

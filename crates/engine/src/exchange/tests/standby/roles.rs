@@ -52,7 +52,7 @@ fn the_inactive_sends_nothing_and_two_of_them_send_nothing() {
     }
 }
 
-// covers: MR-07, MR-16, REQ046, standby
+// covers: MR-07, MR-16, standby
 #[test]
 fn the_first_cycle_of_a_takeover_has_the_latest_outputs_and_merged_inputs() {
     let mut duo = duo();
