@@ -11,7 +11,7 @@ use crate::times::cycle;
 /// What is chosen for a device.
 #[derive(Args, Clone, Debug)]
 pub struct ChoiceArguments {
-    /// Operation mode of the clock: its name, its description, or its number as in "#3"; by default the first
+    /// Mode of the clock: name, description or number ("#3"); the first by default
     #[arg(long, value_name = "MODE", help_heading = "Choices")]
     mode: Option<String>,
     /// Module of the next slot by type or ident; - for an empty slot

@@ -183,7 +183,7 @@ fn the_checks_find_frames_that_have_waited_in_a_standby_without_a_limit() {
 }
 
 #[test]
-#[should_panic(expected = "device 3 leaves OP after")]
+#[should_panic(expected = "device 3 leaves OP for INIT")]
 fn the_checks_find_a_subdevice_that_leaves_op_before_its_watchdog() {
     let mut pair = Pair::new(6, ring_of_two(6, 8, Host::First));
     pair.run_cycles(5);
