@@ -1,11 +1,13 @@
 //! Two MainDevices of the library at one ring, each a program on its host: they join, follow, take over and hand the
 //! role over. Evaluated from inside the SubDevices.
 
+use std::sync::mpsc;
 use std::time::Duration;
 
 use ringcat::simulated::SimulatedSegment;
+use ringcat::simulated::two_hosts::HostLinks;
 use ringcat::standby::{Policy, RoleRequest, StandbyOptions};
-use ringcat::{Error, MainDevice, Options, RingState, automatic};
+use ringcat::{ActivateError, Error, LrwPolicy, MainDevice, Options, RingState, automatic};
 use ringcat_sim::cable::Host;
 use ringcat_sim::fault::Fault;
 use scenarios::pair::{CYCLE, Pair, Phase, TIME_OUT_CYCLES};
@@ -269,6 +271,31 @@ fn an_active_that_no_other_one_replaces_goes_on_with_its_subdevices() {
         // A time-out and a random pause of a time-out at most.
         assert!(gap <= CYCLE * (down + 2 * TIME_OUT_CYCLES + 2), "{here}");
     }
+}
+
+// covers: standby, REQ047
+#[test]
+fn one_of_two_refuses_a_declaration_with_lrw_and_says_why() {
+    let mut pair = Pair::without_programs(15, ring_of_two(4, Host::First));
+    pair.start_standby(Host::Second);
+    let (sender, results) = mpsc::channel();
+    let program = move |mut links: HostLinks| {
+        links.switch(true);
+        let options = Options::default().with_standby(StandbyOptions::default());
+        let mut main_device = MainDevice::request(links, &options);
+        main_device.become_active();
+        let refused = main_device.bring_up(|scan| {
+            let mut declaration = automatic(&scan.subdevices, CYCLE);
+            declaration.lrw = LrwPolicy::PerSubDevice;
+            declaration
+        });
+        sender.send(refused.err().map(|refused| refused.error)).expect("the test waits");
+    };
+    pair.hosts().start(Host::First, program).expect("a thread starts");
+    pair.hosts().run_for(Duration::from_secs(1));
+    let refused = results.try_recv().expect("it ends within a second");
+    let is_lrw = matches!(refused, Some(Error::Activate(ActivateError::LrwWithStandby)));
+    assert!(is_lrw, "{refused:?}");
 }
 
 // covers: standby, MR-22
