@@ -95,6 +95,6 @@ impl Order {
     }
 
     fn behind(&self, at: Option<usize>, names: &[String]) -> String {
-        at.map_or_else(|| "before all".to_owned(), |at| format!("behind \"{}\"", names[self.declared[at].config]))
+        at.map_or_else(|| "first".to_owned(), |at| format!("behind \"{}\"", names[self.declared[at].config]))
     }
 }
