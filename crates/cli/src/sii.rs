@@ -162,7 +162,7 @@ fn descriptions(path: &Path) -> Result<Vec<Esi>, Failure> {
     Ok(files.iter().filter_map(read).collect())
 }
 
-/// The bytes of an image. The limit applies to what is read: a device reports no length.
+/// The bytes of an image. The limit applies to the bytes that are read.
 fn image_of(path: &Path) -> Result<Vec<u8>, Failure> {
     const LIMIT: usize = SiiHeader::MAX_EEPROM_BYTES;
     let read = read_at_most(path, LIMIT as u64 + 1);

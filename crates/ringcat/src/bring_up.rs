@@ -43,7 +43,7 @@ impl<L: Links> MainDevice<L> {
         }
     }
 
-    /// Scans, and reads what operation needs of the SIIs.
+    /// Scans, and reads the words of the SIIs that operation needs.
     pub(crate) fn scan_for_operation(&mut self) -> Result<Scan, Error> {
         self.engine.start_scan_for_operation()?;
         self.finish_scan(|_| ())
@@ -64,7 +64,7 @@ impl SupervisorThread {
         }
     }
 
-    /// Scans, and reads what operation needs of the SIIs.
+    /// Scans, and reads the words of the SIIs that operation needs.
     pub(crate) fn scan_for_operation(&self) -> Result<Scan, Error> {
         self.act(Engine::start_scan_for_operation)??;
         self.finish_scan(|| ())

@@ -64,7 +64,7 @@ impl OfTwo {
         if let Some(other) = engine.take_collision()
             && is_lower(other, links.addresses().main)
         {
-            // Without an application no other one can decide. A scan under way ends with an error.
+            // There is no application that could decide. A scan under way ends with an error.
             engine.set_role(MainDeviceRole::Inactive);
         }
         any

@@ -4,11 +4,11 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::Path;
 
-/// The bytes of a file, at most `limit`. A pipe could keep its reader waiting for ever, and a device never ends: only
-/// regular files are opened.
+/// The bytes of a file, at most `limit`. Only regular files are read: a pipe could keep its reader waiting for ever,
+/// and a device never ends. A directory fails with the error of the system.
 ///
 /// # Errors
-/// A file that is missing, is no regular file, or cannot be read.
+/// The file is missing, is no regular file, or cannot be read.
 pub fn read_at_most(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     let kind = fs::metadata(path)?;
     if !kind.is_file() && !kind.is_dir() {

@@ -171,8 +171,8 @@ pub struct DeviceDescription {
     pub pdos: Vec<PdoDescription>,
     /// Objects in addition to the derived ones; they replace those with the same index.
     pub objects: Vec<Object>,
-    /// Objects of the description of the device that are derived here: the derived ones have their names. Those that
-    /// are not derived are in the dictionary as they are.
+    /// Objects of a device description that the simulator derives itself: the derived objects take their names from
+    /// here. Those that it does not derive are in the dictionary as described.
     pub described: Vec<Object>,
     /// Indices of objects that a MainDevice cannot access: for it they do not exist.
     pub left_out: Vec<u16>,

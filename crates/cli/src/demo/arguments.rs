@@ -15,6 +15,7 @@ const SLOW_ABOVE: usize = 200;
 const SLOW_CYCLE: Duration = Duration::from_millis(4);
 /// Cycle of any other.
 const CYCLE: Duration = Duration::from_millis(1);
+
 /// Options of `ringcat demo`.
 #[derive(Args, Debug, Default)]
 pub struct DemoArguments {
@@ -34,14 +35,14 @@ pub struct DemoArguments {
     pub fast: bool,
     /// Show two controllers at the ring, one of which is killed
     ///
-    /// Both run with the library, and either takes over from the other: when it is killed, loses its power, or hands
-    /// its role over while a cable is cut. See docs/standby.md, which begins with a note on patents.
+    /// Both use the library, and each takes over from the other: when that one is killed, loses its power, or hands its
+    /// role over while a cable is cut. See docs/standby.md, which begins with a note on patents.
     #[cfg(feature = "standby")]
     #[arg(long, help_heading = "Two controllers")]
     pub standby: bool,
-    /// Cycles without the ACTIVE after which the other one takes over, 3
+    /// Cycles without the ACTIVE after which the other one takes over; 3 by default
     ///
-    /// Where the watchdogs of the SubDevices expire before that, they leave OP and the demonstration fails.
+    /// If the watchdogs of SubDevices expire before that, these leave OP and the demonstration fails.
     #[cfg(feature = "standby")]
     #[arg(
         long,

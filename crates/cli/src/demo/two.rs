@@ -1,5 +1,6 @@
-//! `ringcat demo --standby`: two controllers at one simulated ring. One is killed, is started again, is handed the role
-//! over while a cable is cut, and loses its power. What each SubDevice notices is read inside the simulated devices.
+//! `ringcat demo --standby`: two controllers at one simulated ring. A controller is killed and started again, roles are
+//! handed over, once while a cable is cut, and a controller loses its power. What each SubDevice notices is read inside
+//! the simulated devices.
 //!
 //! Both controllers are programs with the library, each in a thread of its own; virtual time passes only while all of
 //! them wait, so a machine that is late changes nothing.
@@ -105,7 +106,7 @@ fn with_two_hosts(mut segment: Segment) -> Result<Segment, Failure> {
     }
     // A tree has a cable per device, a ring one more.
     if segment.cables.len() > segment.devices.len() + 1 {
-        return Err(Failure::new("the segment has rings behind junctions: not with two controllers"));
+        return Err(Failure::new("two controllers need a single ring: got a segment with rings behind junctions"));
     }
     let delay = ringcat::sim::cable::DEFAULT_CABLE_DELAY;
     segment.cables.push(CableSpec { a: Endpoint::Host(HostLink::SecondMain), b: redundant, delay });

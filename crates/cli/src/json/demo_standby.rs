@@ -32,7 +32,7 @@ pub struct StandbyIncident {
     pub text: String,
     /// Longest time between outputs in a SubDevice, in nanoseconds
     pub longest_ns: u64,
-    /// Most that is allowed, in nanoseconds
+    /// Longest time that is allowed, in nanoseconds
     pub limit_ns: u64,
 }
 

@@ -74,6 +74,6 @@ pub struct Difference {
 pub struct SiiSkeleton {
     /// Bytes of the description
     pub bytes: usize,
-    /// What a description cannot say of the mailboxes of the image
+    /// What a description cannot express about the mailboxes of the image
     pub notices: Vec<String>,
 }

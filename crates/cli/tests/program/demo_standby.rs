@@ -34,7 +34,7 @@ fn the_demonstration_of_two_controllers_holds_and_fits_80_columns() {
 
 // covers: demo, standby, 9.9
 #[test]
-fn a_time_out_longer_than_the_watchdogs_does_not_hold() {
+fn a_time_out_longer_than_the_watchdogs_makes_the_demonstration_fail() {
     let output = demo(&["--timeout", "150"]);
     let said = text(&output.stdout);
     assert_eq!(output.status.code(), Some(1), "{said}");

@@ -87,7 +87,7 @@ pub(super) fn align(configuration: &Configuration, found: &[SubDeviceInfo], stat
     in_order(&info_of, &moved, &taken)
 }
 
-/// Which of those that are declared by position and were found stand elsewhere.
+/// Marks the SubDevices that are declared by position and were found at another place.
 fn name_moves(configs: &[SubDeviceConfig], info_of: &[Option<usize>], moved: &mut [bool]) {
     let mut both: Vec<(usize, usize)> = (0..configs.len())
         .filter(|config| by_position(&configs[*config]))
@@ -165,7 +165,7 @@ fn before(declared: &[usize], count: usize) -> Vec<Option<usize>> {
 
 /// The SubDevices that were found, by what a declaration can say of their device.
 struct ByDevice {
-    /// In their order, from the last one on; those at the end may be taken.
+    /// In reverse order. Those at the end of a list may have been taken meanwhile.
     places: BTreeMap<DeviceKey, Vec<usize>>,
 }
 
@@ -243,7 +243,7 @@ fn common(configs: &[usize], infos: &[usize], degree: &impl Fn(usize, usize) -> 
     pairs
 }
 
-/// The sequence with most pairs of one SubDevice, then with most pairs of one device.
+/// The sequence with the most pairs of degree [`OWN`], then with the most pairs of the same device.
 fn best(configs: &[usize], infos: &[usize], degree: &impl Fn(usize, usize) -> u32) -> Vec<(usize, usize)> {
     let width = infos.len() + 1;
     let mut sums = vec![0u32; (configs.len() + 1) * width];

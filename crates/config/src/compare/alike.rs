@@ -1,4 +1,4 @@
-//! How much a found SubDevice is a declared one: its device, and the identity that the file demands.
+//! How well a found SubDevice matches a declared one: its device type, and the identity that the file demands.
 
 use std::collections::BTreeMap;
 
@@ -7,10 +7,10 @@ use ringcat_engine::info::SubDeviceInfo;
 
 use super::difference::Stated;
 
-/// Degree of a SubDevice that has all that the file demands: more than any sum of those of one device, of which a
-/// sequence has at most 4,096.
+/// Degree of a SubDevice that has all that the file demands. It is more than any sum of [`SAME_DEVICE`]: a sequence has
+/// at most 4,096 pairs.
 pub(super) const OWN: u32 = 1 << 13;
-/// Degree of a SubDevice of the same device that the file refuses, as one of another serial number.
+/// Degree of a SubDevice of the same vendor and product that the file refuses, for example for its serial number.
 const SAME_DEVICE: u32 = 1;
 
 /// Vendor, product, serial number.
@@ -21,9 +21,9 @@ pub(super) struct Alike<'a> {
     configs: &'a [SubDeviceConfig],
     found: &'a [SubDeviceInfo],
     stated: &'a [Stated],
-    /// The first SubDevice of each unit that the file demands.
+    /// The first found SubDevice of each unit that the file demands.
     found_units: BTreeMap<Unit, usize>,
-    /// The units that the file demands.
+    /// The units that the file demands, with their declarations.
     declared_units: BTreeMap<Unit, usize>,
 }
 
@@ -37,7 +37,8 @@ impl<'a> Alike<'a> {
         Alike { configs, found, stated, found_units, declared_units }
     }
 
-    /// 0: another device, or one of which the other side has the serial number elsewhere.
+    /// How well both match: 0 for another vendor or product, and if the serial number of one of them is elsewhere on
+    /// the other side.
     pub(super) fn degree(&self, config: usize, info: usize) -> u32 {
         let declared = &self.configs[config];
         if !is_device(declared, self.stated.get(config), &self.found[info]) {
@@ -50,7 +51,7 @@ impl<'a> Alike<'a> {
         }
     }
 
-    /// Whether one of both has a serial number that the other side has elsewhere.
+    /// Whether the serial number of one of them is elsewhere on the other side.
     pub(super) fn is_claimed(&self, config: usize, info: usize) -> bool {
         let (demanded, own) = (unit(&self.configs[config], self.stated.get(config)), unit_of(&self.found[info]));
         demanded != Some(own)
@@ -75,7 +76,7 @@ const fn unit_of(info: &SubDeviceInfo) -> Unit {
     (info.identity.vendor_id, info.identity.product_code, info.identity.serial)
 }
 
-/// Vendor and product; `None`: any.
+/// Vendor and product; `None` matches any.
 pub(super) type DeviceKey = (Option<u32>, Option<u32>);
 
 /// Vendor and product of a declared SubDevice.

@@ -13,7 +13,7 @@ use super::process_data;
 
 /// Objects with the modules that are configured and detected (ETG.5001.1).
 const MODULES: [u16; 2] = [0xF030, 0xF050];
-/// PDOs that a message lists.
+/// Most PDOs that a message lists; further ones are counted.
 const LISTED: usize = 8;
 
 /// Whether start-up commands name the modules in the slots of a SubDevice: its SII cannot list their PDOs.
@@ -25,8 +25,8 @@ pub(super) fn names_modules(declared: &SubDeviceConfig) -> bool {
     })
 }
 
-/// The SyncManagers with another assignment, each with one text; none where the file cannot be planned, which has a
-/// reason of its own.
+/// The SyncManagers with another assignment, each with a text. None if the file cannot be planned: that is a difference
+/// of its own.
 pub(super) fn differences(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> Vec<(u8, String)> {
     let wanted = wanted(declared);
     let is_silent = wanted.values().all(|pdos| pdos.as_ref().is_none_or(Vec::is_empty)) && declared.declared.is_some();
@@ -56,7 +56,7 @@ pub(super) fn differences(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> V
     differences
 }
 
-/// The PDOs of each SyncManager of the file; `None` where it has a length only.
+/// The PDOs of each SyncManager of the file; `None` if the file has only its length.
 fn wanted(declared: &SubDeviceConfig) -> BTreeMap<u8, Option<Vec<u16>>> {
     let mut wanted = BTreeMap::new();
     if let Some(declared) = &declared.declared {

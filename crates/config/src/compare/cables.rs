@@ -95,7 +95,7 @@ pub(super) fn compare(
     differences
 }
 
-/// Where a cable ends if additional SubDevices are taken out: these are differences themselves.
+/// Where a cable would end without the additional SubDevices, which are differences themselves.
 fn behind_additional(got: Option<PortOf>, topology: &Topology, known: &BTreeMap<usize, usize>) -> Option<PortOf> {
     let mut end = got;
     // A line has at most as many SubDevices as there are positions.

@@ -88,8 +88,8 @@ impl Both<'_> {
         false
     }
 
-    /// Appends the differences of the process data, by SyncManager; of a SubDevice with modules only those of PDOs that
-    /// both describe.
+    /// Appends the differences of the process data, by SyncManager; for a SubDevice with modules, only those of PDOs
+    /// that both sides describe.
     fn process_data(&self, differences: &mut Vec<Difference>) {
         let (declared, info) = (self.declared, self.info);
         let is_modular = assignment::names_modules(declared) || self.stated.is_some_and(|stated| stated.modular);
@@ -152,7 +152,7 @@ fn buffers(mailbox: Option<[(u16, u16); 2]>) -> String {
 }
 
 /// How a PDO differs from the one that the SubDevice describes. A SubDevice that describes no PDO at all has no
-/// difference: its dictionary was not read. `may_lack`: one that it does not describe is none.
+/// difference: its dictionary was not read. With `may_lack`, a PDO that it does not describe is no difference.
 fn pdo_difference(pdo: &PdoMapping, info: &SubDeviceInfo, may_lack: bool) -> Option<String> {
     if info.pdos.is_empty() {
         return None;

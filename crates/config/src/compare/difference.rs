@@ -103,8 +103,8 @@ pub struct Stated {
     pub mailbox: Option<[(u16, u16); 2]>,
     /// Version of the firmware (object 0x100A); empty if it is not compared.
     pub firmware: String,
-    /// It has modules in slots (object 0xF050): its EEPROM lists the PDOs of the head only. Start-up commands for
-    /// 0xF030 say it too.
+    /// It has modules in slots (object 0xF050): its EEPROM lists only the PDOs of the head. Start-up commands for
+    /// 0xF030 show this as well.
     pub modular: bool,
 }
 

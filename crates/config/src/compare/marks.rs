@@ -31,7 +31,7 @@ impl Marks {
         marks
     }
 
-    /// Whether the activation fails because of this declaration; with nothing required it fails because of none.
+    /// Whether the activation fails because of this declaration; never with nothing required.
     pub(super) fn fails(&self, config: usize) -> bool {
         match (self.resolutions.get(config), self.required) {
             (_, Required::Nothing) => false,
@@ -41,8 +41,8 @@ impl Marks {
         }
     }
 
-    /// Whether a SubDevice that is missing prevents OP. With nothing required it does not: the engine finds those
-    /// behind it by their identities.
+    /// Whether a SubDevice that is missing prevents OP. With nothing required it does not: the engine finds the
+    /// SubDevices behind it by their identities.
     pub(super) fn misses(&self, config: usize, declared: &SubDeviceConfig) -> bool {
         self.fails(config) || (!declared.optional && self.required != Required::Nothing)
     }

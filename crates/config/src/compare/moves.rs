@@ -1,10 +1,10 @@
-//! Which SubDevices of a sequence stand at another place: pairs that have changed places, and single ones that moved.
-//! What is missing or additional is no part of the sequence, so that it moves nothing behind it.
+//! Which SubDevices of a sequence are at another place: pairs that have changed places, and single ones that moved.
+//! Missing and additional SubDevices are no part of the sequence: they move nothing behind them.
 
 /// A change of place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Move {
-    /// It stands elsewhere.
+    /// It is at another place.
     Alone,
     /// It has changed places with this one.
     With(usize),
@@ -26,7 +26,7 @@ pub(super) fn moves(bus: &[usize]) -> Vec<Option<Move>> {
         stays[at] = true;
     }
     for at in rest {
-        // In the middle of others that moved it may stand where it was.
+        // One that is not in order may still be at its place, between others that moved.
         if !stays[at] && ranks[at] != at {
             moves[at] = Some(Move::Alone);
         }
@@ -34,9 +34,10 @@ pub(super) fn moves(bus: &[usize]) -> Vec<Option<Move>> {
     moves
 }
 
-/// The longest part in order; of several the one with most members at their places.
+/// The longest subsequence in order; of several, the one with the most members at their places.
 fn in_order(members: &[usize], ranks: &[usize]) -> Vec<usize> {
-    // Best end so far of those with a rank up to each one, in a Fenwick tree: length, members at their places, member.
+    // A Fenwick tree over the ranks, with the best subsequence up to each rank: its length, its members at their
+    // places, its last member.
     let mut tree: Vec<(u32, u32, usize)> = vec![(0, 0, usize::MAX); ranks.len() + 1];
     let mut before = vec![usize::MAX; ranks.len()];
     let mut best = (0, 0, usize::MAX);

@@ -54,7 +54,7 @@ impl Order {
         let Member { file, bus, .. } = self.declared[at];
         let name = &names[config];
         let Some(Move::With(other)) = self.moves[at] else {
-            // The numbers may be the same by chance, where others are missing or additional before it.
+            // Both positions may be the same number by chance if others are missing or additional before it.
             if file == bus {
                 let (is, said) = (self.behind_on_bus(at, names), self.behind(at.checked_sub(1), names));
                 return Some(format!("\"{name}\" is {is}, the file has it {said}"));
@@ -81,7 +81,7 @@ impl Order {
         })
     }
 
-    /// The one that a SubDevice has changed places with.
+    /// The SubDevice with which this one has changed places.
     pub(super) fn other(&self, config: usize) -> Option<usize> {
         match self.moves[*self.index.get(&config)?] {
             Some(Move::With(other)) => Some(self.declared[other].config),
@@ -95,6 +95,6 @@ impl Order {
     }
 
     fn behind(&self, at: Option<usize>, names: &[String]) -> String {
-        at.map_or_else(|| "before all".to_owned(), |at| format!("behind \"{}\"", names[self.declared[at].config]))
+        at.map_or_else(|| "first".to_owned(), |at| format!("behind \"{}\"", names[self.declared[at].config]))
     }
 }

@@ -74,7 +74,8 @@ fn mode<'a>(
     Ok(Some(found))
 }
 
-/// The mode with a name, else with a description, else with a number as in "#3". Names repeat in real files.
+/// The mode with this name, else with this description, else with this number as in "#3". In real files several modes
+/// may have the same name.
 fn chosen<'a>(modes: &'a [OpMode], wanted: &str) -> Result<&'a OpMode, String> {
     let of = |text: fn(&OpMode) -> &str| -> Vec<(usize, &'a OpMode)> {
         (1..).zip(modes).filter(|(_, mode)| text(mode).trim() == wanted.trim()).collect()

@@ -80,7 +80,7 @@ pub(super) fn complete(
         out.write(&[Ip], "clear DC activation", map::DC_CYCLIC_UNIT_CONTROL, vec![0; 2]);
     }
     out.raw(config, EngineTransition::Ip);
-    // An application reads it while it starts (protocol ES-116), as in a bring-up of the engine.
+    // The application of a SubDevice reads the EEPROM while it starts (protocol ES-116); the engine does the same.
     if has_mailbox || config.sii_to_pdi {
         out.eeprom_to_pdi(Ip);
     }

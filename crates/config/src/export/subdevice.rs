@@ -22,7 +22,7 @@ pub(super) fn subdevice(
     let (config, facts) = (&whole.declaration.subdevices[index], &whole.subdevices[index]);
     let order = order(&config.startup).ok_or_else(|| {
         let reason = "commands to registers and commands of mailbox protocols alternate: an ENI has each kind in a \
-                      list of its own. At PS the commands that assign PDOs are among those of CoE, behind those \
+                      list of its own. At PS the commands that assign PDOs are among those of CoE, after those \
                       without `after_pdos`";
         ExportError::of(whole, index, "start-up commands", reason)
     })?;

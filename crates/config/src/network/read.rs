@@ -98,11 +98,11 @@ fn version(root: &DeTable<'_>) -> Result<(), Fault> {
     }
 }
 
-/// Keys with arrays.
+/// Keys whose values are arrays.
 const ARRAYS: [&str; 8] =
     ["domain", "subdevice", "sync_manager", "pdo", "entries", "startup", "connection", "protocols"];
 
-/// Refuses arrays in place of tables, which the reader of types takes as values without keys.
+/// Refuses arrays in place of tables: the deserializer would take their elements as the values of the keys in order.
 fn tables(table: &DeTable<'_>, path: &mut Vec<Step>) -> Result<(), Fault> {
     for (key, value) in table {
         path.push(Step::Key(key.get_ref().to_string()));

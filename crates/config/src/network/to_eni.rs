@@ -35,7 +35,7 @@ impl NetworkFile {
             let config = &mut configuration.declaration.subdevices[index];
             if !pdos::place(&mut config.startup, of) {
                 let reason = "an ENI has the commands of each protocol, and those to registers, in lists of their own: \
-                              the commands that assign PDOs are behind others of CoE, before those behind these";
+                              the commands that assign PDOs follow the other CoE commands without `after_pdos`";
                 left_out.push(LeftOut::new(index, "order of the start-up commands at PS", reason));
             }
             config.sync_managers.clear();

@@ -160,7 +160,7 @@ mod tests {
             assert_eq!((Time::of(wrong), Shift::of(wrong)), (None, None), "{wrong}");
         }
         assert_eq!([Bytes::of("e"), Bytes::of("+1"), Bytes::of("e8 0"), Bytes::of("ä")], [const { None }; 4]);
-        // Blanks are between bytes, not within one: "0 1" is neither the byte 01 nor two bytes.
+        // Blanks separate bytes: "0 1" is neither the byte 01 nor two bytes.
         assert_eq!([Bytes::of("0 1"), Bytes::of("e8 0 3"), Bytes::of("e 803")], [const { None }; 3]);
         assert_eq!([Mac::of("02:00"), Mac::of("02:00:00:00:00:01:02"), Mac::of("2:0:0:0:0:1")], [None; 3]);
     }

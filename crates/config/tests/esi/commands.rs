@@ -135,7 +135,7 @@ fn declared(file: &NetworkFile) -> Vec<(u16, bool)> {
 
 // covers: esi-declare, ES-125, ES-126, eni-run
 #[test]
-fn modules_are_before_the_pdos_and_start_up_commands_behind_them() {
+fn modules_are_before_the_pdos_and_start_up_commands_after_them() {
     let command = |index: &str| {
         format!(
             "<InitCmd><Transition>PS</Transition><Index>{index}</Index><SubIndex>0</SubIndex><Data>01</Data></InitCmd>"

@@ -187,7 +187,7 @@ fn a_description_of_an_image_keeps_mailboxes_without_a_protocol() {
 
 // covers: ES-80, ES-105
 #[test]
-fn mailboxes_that_a_description_cannot_say_are_notices() {
+fn mailboxes_that_a_description_cannot_express_are_notices() {
     let mut image = built(&without_protocol(), |_| {});
     image[50] = 0x60;
     image[56] = 0x84;

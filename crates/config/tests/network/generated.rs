@@ -58,7 +58,7 @@ fn changed(base: &[SubDeviceInfo], numbers: &mut Numbers) -> (Vec<SubDeviceInfo>
     let mut before: Vec<Option<SubDeviceInfo>> = vec![None; base.len()];
     let mut expected: Vec<Expected> = Vec::new();
     let quoted = |info: &SubDeviceInfo| format!("\"{}\"", info.name);
-    // Changes are at least two places from each other: a missing unit beside an additional one is a replaced one.
+    // Changes are at least two places apart: a missing unit next to an additional one would be a replaced one.
     let mut places: Vec<usize> = (0..base.len() / 3).map(|at| 3 * at + numbers.below(2)).collect();
     let is_swapped = numbers.below(2) == 0;
     if is_swapped {

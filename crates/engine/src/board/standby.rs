@@ -24,7 +24,7 @@ pub enum Takeover {
     ThroughInit,
     /// Process data of the other MainDevice: SubDevices keep their configuration.
     FromOther,
-    /// What it has left itself: no other MainDevice was heard since. SubDevices keep their configuration.
+    /// Its own last state: no other MainDevice was heard since. SubDevices keep their configuration.
     FromItself,
 }
 
@@ -41,18 +41,18 @@ pub struct StandbyWords {
     session: AtomicU32,
     /// Digest of its configuration.
     identity: AtomicU64,
-    /// The last [`Takeover`], as a number.
+    /// The last [`Takeover`], as a number. Writer: the cyclic half.
     takeover: AtomicU8,
     /// When a frame of the other MainDevice came last while this one is INACTIVE; 0 before. Writers: both halves.
     heard_at: AtomicU64,
     /// Its version and the oldest one that could read it, if this MainDevice cannot; 0 otherwise.
     other_version: AtomicU32,
-    /// Address and link of an acyclic frame of another MainDevice that has come since this one is ACTIVE; 0 without.
-    /// Writer: the acyclic half.
+    /// Source address and link of an acyclic frame of another MainDevice that came while this one was ACTIVE; 0 without
+    /// one. Writer: the acyclic half; the cyclic half takes it.
     collision: AtomicU64,
 }
 
-/// Marks a collision, and one on the redundant link.
+/// Bits of the word of a collision beside the address: there is one, and it came on the redundant link.
 const COLLIDED: u64 = 1 << 63;
 const ON_REDUNDANT: u64 = 1 << 62;
 
@@ -98,7 +98,7 @@ impl StandbyWords {
         self.heard_at.fetch_max(now.0.max(1), Ordering::Relaxed);
     }
 
-    /// When one came last.
+    /// When a frame of the other MainDevice came last.
     pub fn heard_at(&self) -> Option<Instant> {
         let at = self.heard_at.load(Ordering::Relaxed);
         (at != 0).then_some(Instant(at))
@@ -110,7 +110,7 @@ impl StandbyWords {
         self.collision.store(COLLIDED | link | u64::from_be_bytes([0, 0, a, b, c, d, e, f]), Ordering::Relaxed);
     }
 
-    /// Takes it.
+    /// Takes the posted collision: the link of the frame, and its source address.
     pub fn take_collision(&self) -> Option<(Link, MacAddress)> {
         if self.collision.load(Ordering::Relaxed) == 0 {
             return None;

@@ -29,7 +29,7 @@ pub struct PdoMapping {
     pub fixed: bool,
 }
 
-/// A mapping that may be written has the digest that it had before there were others.
+/// Without `fixed` the digest is the same as before this field existed.
 impl Hash for PdoMapping {
     fn hash<H: Hasher>(&self, state: &mut H) {
         let PdoMapping { index, entries, fixed } = self;

@@ -16,8 +16,8 @@ use crate::declared::SubDeviceId;
 use crate::info::SubDeviceInfo;
 use crate::order::InOrder;
 
-/// Declarations by position times optional ones among them, at most, of which all combinations are compared: each
-/// takes a byte.
+/// Limit up to which all combinations are compared: declarations by position times optional ones among them. Each
+/// combination takes a byte.
 const MAX_COMBINATIONS: usize = 1 << 24;
 
 /// Two SubDevices with the same alias.
@@ -58,8 +58,8 @@ pub fn duplicate_aliases(infos: &[SubDeviceInfo]) -> Vec<DuplicateAlias> {
 ///
 /// Groups are found first, at any place; positions count the SubDevices that belong to no group. If an optional
 /// SubDevice is absent, the following declarations by position are searched one place nearer to the start. Of several
-/// combinations of absent optional SubDevices, that with the fewest errors is taken; with more than
-/// 2^24 an optional one is absent where it does not fit. Alias 0 counts all SubDevices.
+/// combinations of absent optional SubDevices, that with the fewest errors is taken. With more than 2^24 combinations
+/// an optional SubDevice counts as absent where it does not fit. Alias 0 counts all SubDevices.
 pub fn resolve(configs: &[SubDeviceConfig], infos: &[impl Borrow<SubDeviceInfo>]) -> Vec<Resolution> {
     let infos: Vec<&SubDeviceInfo> = infos.iter().map(Borrow::borrow).collect();
     let infos = &infos[..];
@@ -131,11 +131,12 @@ fn by_position(configs: &[SubDeviceConfig]) -> Vec<(usize, usize)> {
     found
 }
 
-/// Whether optional SubDevices are better taken as absent.
+/// Which optional SubDevices count as absent.
 enum Absences {
-    /// By declaration of those by position, and by the number of absent ones before it.
+    /// Whether absence gives fewer errors: by declaration of those by position, and by the number of absent ones before
+    /// it.
     Best { is_better: Vec<bool>, width: usize },
-    /// Too many combinations: one that does not fit is absent.
+    /// Too many combinations: an optional SubDevice that does not fit its place is absent.
     Simple,
 }
 
@@ -167,7 +168,7 @@ impl Absences {
         Absences::Best { is_better, width }
     }
 
-    /// Whether optional declaration n of those by position is better taken as absent.
+    /// Whether optional declaration n of those by position counts as absent.
     fn is_better(&self, n: usize, absent: usize, fits: impl FnOnce() -> bool) -> bool {
         match self {
             Absences::Best { is_better, width } => is_better[n * width + absent],

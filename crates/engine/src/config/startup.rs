@@ -347,12 +347,12 @@ pub struct StartupCommand {
     pub limit: Option<Duration>,
     /// Purpose, as the author of the declaration wrote it; for messages.
     pub comment: Option<String>,
-    /// It is sent behind the PDO assignment and mapping of the declaration; otherwise before them. Only at PS, where
-    /// these are written.
+    /// It is sent after the PDO assignment and mapping of the declaration; otherwise before them. It has no effect at
+    /// other transitions than PS, where these are written.
     pub after_pdos: bool,
 }
 
-/// A command before the PDOs has the digest that it had before there were others.
+/// Without `after_pdos` the digest is the same as before this field existed.
 impl Hash for StartupCommand {
     fn hash<H: Hasher>(&self, state: &mut H) {
         let StartupCommand { transition, action, limit, comment, after_pdos } = self;
@@ -371,7 +371,7 @@ impl StartupCommand {
         self
     }
 
-    /// Whether it is sent behind the PDOs.
+    /// Whether it is sent after the PDO assignment and mapping.
     pub fn is_after_pdos(&self) -> bool {
         self.after_pdos && self.transition == Transition::Ps
     }

@@ -1,4 +1,4 @@
-//! Counts the work of a resolution in tests: it has to grow as networks do.
+//! Counts the steps of a resolution, in tests only: they must grow linearly with the network.
 
 #[cfg(test)]
 use core::cell::Cell;
@@ -8,14 +8,14 @@ std::thread_local! {
     static STEPS: Cell<usize> = const { Cell::new(0) };
 }
 
-/// A step.
+/// Counts a step.
 #[inline]
 pub(super) fn step() {
     #[cfg(test)]
     STEPS.set(STEPS.get() + 1);
 }
 
-/// The steps of this thread so far.
+/// Steps that this thread has counted so far.
 #[cfg(test)]
 pub(super) fn so_far() -> usize {
     STEPS.get()

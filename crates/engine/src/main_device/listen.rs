@@ -20,7 +20,7 @@ impl MainDevice {
 
     /// Takes and fills a received frame of another MainDevice before it is forwarded, without an application: as
     /// INACTIVE with the options of MainDevice redundancy. Any bytes are allowed. With an application
-    /// [`Exchange::fill`](crate::exchange::Exchange::fill) does that, and here it is noted that a frame has come.
+    /// [`Exchange::fill`](crate::exchange::Exchange::fill) does that; this function then only notes that a frame came.
     pub fn fill(&mut self, arrived_on: Link, frame: &mut [u8], now: Instant) {
         if self.role() != MainDeviceRole::Inactive {
             return;

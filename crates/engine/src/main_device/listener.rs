@@ -63,7 +63,7 @@ impl Listener {
     }
 }
 
-/// Knowledge of an ACTIVE, once all of it is there.
+/// Knowledge of an ACTIVE; `None` before all of it has been written.
 pub(super) fn known(sheet: &Sheet) -> Option<Knowledge> {
     let (_, bytes) = sheet.copy()?;
     Knowledge::from_bytes(&bytes).ok()

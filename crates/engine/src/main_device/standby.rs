@@ -24,7 +24,7 @@ pub(super) struct Standby {
     pub listener: Option<Listener>,
     /// A version of the ACTIVE that cannot be read, and was reported.
     pub other_version: Option<u8>,
-    /// The last collision without an application.
+    /// The last collision while there was no application.
     pub collision: Option<Collision>,
     /// When the knowledge is made next, at the earliest and if nothing has changed.
     pub publish_at: (Instant, Instant),
@@ -32,12 +32,12 @@ pub(super) struct Standby {
     pub published: Option<Marks>,
 }
 
-/// Frames of another ACTIVE have come.
+/// Frames of another ACTIVE that have come.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Collision {
     /// When the last one came.
     pub at: Instant,
-    /// Its sender, until it is asked for.
+    /// The sender of the last one, until it is taken.
     pub source: Option<MacAddress>,
 }
 

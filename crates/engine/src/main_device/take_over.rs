@@ -26,7 +26,7 @@ use crate::segment::setup::Setup;
 use crate::segment::{Observation, StandbyObservation};
 use crate::time::Instant;
 
-/// Frames of another ACTIVE belong to another collision after this time without any.
+/// After this time without frames of another ACTIVE, the next one is a new collision.
 const COLLISIONS_APART: Duration = Duration::from_millis(100);
 
 impl MainDevice {
@@ -69,7 +69,7 @@ impl MainDevice {
     }
 
     /// A frame of another MainDevice has come while this one is ACTIVE: a collision (protocol MR-10). Without an
-    /// application it is reported once for frames that follow each other; with one the cyclic half does that.
+    /// application it is reported once for frames that follow each other; with one the cyclic half reports it.
     pub(super) fn note_foreign(&mut self, arrived_on: Link, bytes: &[u8], now: Instant) {
         if self.role() != MainDeviceRole::Active {
             return;
@@ -89,17 +89,18 @@ impl MainDevice {
         }
     }
 
-    /// Takes the address of another MainDevice of which a frame has come since the last call, while this one is ACTIVE
-    /// without an application; with one it is
-    /// [`Exchange::take_collision`](crate::exchange::Exchange::take_collision). Bytes 3 to 5 are those of its main
-    /// interface.
+    /// Takes the source address of a frame of another MainDevice that came since the last call, while this one is
+    /// ACTIVE without an application. With an application, use
+    /// [`Exchange::take_collision`](crate::exchange::Exchange::take_collision). Bytes 3 to 5 are those of the main
+    /// interface of the other MainDevice.
     pub fn take_collision(&mut self) -> Option<MacAddress> {
         self.standby.as_mut()?.collision.as_mut()?.source.take()
     }
 
-    /// The exchange goes on with the process data of the other MainDevice, or with its own. The SubDevices stay as they
-    /// are: none goes through INIT, no address and no register of SyncManagers or FMMUs is written. What was known is
-    /// compared with the segment meanwhile; the first mail of each mailbox is as after a crash of its owner.
+    /// The exchange goes on with the process data of the other MainDevice, or with its own. After a hot takeover the
+    /// SubDevices stay as they are: none goes through INIT, no address and no register of SyncManagers or FMMUs is
+    /// written. What was known is compared with the segment meanwhile; the first mail of each mailbox is as after a
+    /// crash of its owner.
     fn take_over(&mut self) {
         let events = self.supervisor.take_events();
         // The mirror of the other MainDevice ends.
@@ -143,13 +144,13 @@ impl MainDevice {
         self.supervisor.attach_bell(self.requests.bell().clone());
     }
 
-    /// The SubDevices as the ACTIVE before has seen them last.
+    /// The SubDevices as the previous ACTIVE has seen them last.
     fn lives(&self) -> Vec<Life> {
         let live = &self.segment.board.live;
         (0..live.count()).map(|subdevice| live.life(subdevice).unwrap_or_default()).collect()
     }
 
-    /// The last measurement of the clocks by the ACTIVE before.
+    /// The last measurement of the clocks by the previous ACTIVE.
     fn learn_clocks(&self, takeover: Takeover) {
         let knowledge = match takeover {
             Takeover::FromItself => self.published_knowledge(),

@@ -240,7 +240,8 @@ pub enum PlanWarning {
         /// The SyncManager.
         sync_manager: u8,
     },
-    /// The declared mapping differs from the SII, which marks it as fixed. It is not written.
+    /// The declared mapping differs from that of the SubDevice, and the SII or the declaration marks it as fixed. It is
+    /// not written.
     FixedMapping {
         /// Index of the PDO.
         pdo: u16,
@@ -373,7 +374,7 @@ impl fmt::Display for PlanWarning {
                 )
             }
             PlanWarning::FixedMapping { pdo } => {
-                write!(f, "PDO {pdo:#06x}: the declared mapping differs from the SII, which marks it as fixed")
+                write!(f, "PDO {pdo:#06x}: the declared mapping differs from that of the SubDevice, which is fixed")
             }
         }
     }

@@ -18,7 +18,7 @@ pub struct PdoPlan {
     pub wanted: PdoAssignment,
     /// What the SubDevice permits; without any details it may permit all.
     pub details: CoeDetails,
-    /// The PDOs whose mapping the SubDevice fixes.
+    /// PDOs that are declared as fixed: their mapping is not written.
     pub fixed: Vec<u16>,
     /// The downloads, if the dictionary holds what is known of it.
     pub sdos: Vec<SdoDownload>,
@@ -69,7 +69,7 @@ impl PdoPlan {
         self.details.0 == 0 || self.details.pdo_configuration()
     }
 
-    /// Whether the mapping of a PDO may be written.
+    /// Whether the mapping of this PDO may be written.
     pub(super) fn can_map_pdo(&self, pdo: u16) -> bool {
         self.can_map() && !self.fixed.contains(&pdo)
     }

@@ -172,10 +172,10 @@ impl BringUp<'_> {
         self.bus.fpwr(self.station, map::fmmu(*number), &register.encode()).await
     }
 
-    /// Commands of PS around PDO assignment and mapping, watchdog, process data SyncManagers, FMMUs, SAFEOP (protocol
-    /// 5.2). As soon as its FMMUs are set a SubDevice may process outputs and inputs, at different times. Its share of
-    /// a working counter is expected only after it has delivered its inputs, so that the inputs of the others stay
-    /// fresh meanwhile.
+    /// PDO assignment and mapping, with the commands of PS before and after them; then watchdog, process data
+    /// SyncManagers, FMMUs, SAFEOP (protocol 5.2). As soon as its FMMUs are set a SubDevice may process outputs and
+    /// inputs, at different times. Its share of a working counter is expected only after it has delivered its inputs,
+    /// so that the inputs of the others stay fresh meanwhile.
     async fn safeop(&self) -> Result<(), ConfigureError> {
         let plan = &self.setup.plan;
         self.command_pdos(false).await?;

@@ -126,7 +126,7 @@ impl Crossings {
         Crossings { junctions, ports: Vec::new(), search: Search::Idle, reported }
     }
 
-    /// A search under way has ended without a result.
+    /// A search under way has ended without a result: it begins again.
     #[cfg(feature = "standby")]
     pub fn end_search(&mut self) {
         if self.search == Search::UnderWay {

@@ -107,7 +107,8 @@ fn add_modules(
     Ok(())
 }
 
-/// Adds the copies of PDOs with oversampling (protocol ES-47), as many as may be assigned. By default none is.
+/// Adds the copies of PDOs with oversampling (protocol ES-47), as many as may be assigned. No copy is assigned by
+/// default.
 fn add_copies(device: &Device, description: &mut DeviceDescription) {
     let modes = device.clock.iter().flat_map(|clock| &clock.modes).flat_map(|mode| &mode.sync_managers);
     let of_modes: Vec<(u16, u32)> =
@@ -123,7 +124,7 @@ fn add_copies(device: &Device, description: &mut DeviceDescription) {
         let count = listed.chain([default, most]).max().unwrap_or(1);
         let indices = (1..count).map_while(|copy| copy.checked_mul(distance)?.checked_add(own.index.into()));
         let indices = indices.take_while(|index| range.contains(index)).filter_map(|index| u16::try_from(index).ok());
-        // No index occurs again with a distance above 0.
+        // With a distance of 0 the first copy has the index of the PDO itself; above 0 no index repeats.
         for index in indices.take_while(|index| *index != own.index) {
             if description.pdos.iter().all(|it| it.index != index) {
                 description.pdos.push(PdoDescription { index, sync_manager: None, ..own.clone() });

@@ -24,9 +24,9 @@ const NUMBER: usize = 8;
 
 /// Objects of a description.
 pub(super) struct Objects {
-    /// Those that the simulator takes as they are.
+    /// Objects that the simulator takes as they are.
     pub(super) plain: Vec<Object>,
-    /// Those that it creates, with the names of the description.
+    /// Objects that the simulator derives from the rest of the device: it takes their names from here.
     pub(super) derived: Vec<Object>,
 }
 

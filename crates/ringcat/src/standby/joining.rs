@@ -111,9 +111,9 @@ impl<L: Links> MainDevice<L> {
     }
 
     /// Becomes ACTIVE without an application, whatever the other MainDevice does: then a scan, or
-    /// [`MainDevice::bring_up`], is allowed. If another one is ACTIVE as well, the one with the lower address stays
-    /// ([`OnCollision`](super::OnCollision)): a scan of the other one ends with
-    /// [`ScanError::RoleChanged`], and [`Joining`] begins again.
+    /// [`MainDevice::bring_up`], is allowed. If another MainDevice is ACTIVE as well, the one with the lower address
+    /// stays ACTIVE ([`OnCollision`](super::OnCollision)). The scan of the one that becomes INACTIVE ends with
+    /// [`ScanError::RoleChanged`]; it listens again with [`Joining`].
     pub fn become_active(&mut self) {
         self.role_control().request(RoleRequest::Active);
         self.work();

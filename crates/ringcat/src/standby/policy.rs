@@ -14,8 +14,8 @@ use ringcat_wire::frame::MacAddress;
 /// Fewer cycles without process data may be those of a single fault of a cable.
 const LEAST_CYCLES: u32 = 3;
 
-/// What an ACTIVE with an application does that receives frames of another ACTIVE (protocol MR-10). Without one, during
-/// a scan, it is always [`OnCollision::LowerAddressStays`].
+/// What an ACTIVE with an application does if it receives frames of another ACTIVE (protocol MR-10). Without an
+/// application, during a scan, [`OnCollision::LowerAddressStays`] always applies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum OnCollision {

@@ -110,7 +110,7 @@ impl<C: Links> Listening<C> {
                     let scan = self.supervisor.become_active().and_then(|()| self.supervisor.scan_for_operation());
                     match scan {
                         Ok(scan) => return self.supervisor.activate(declare(&scan), self.links),
-                        // Another MainDevice is ACTIVE as well, and stays so.
+                        // Another MainDevice is ACTIVE as well, and stays ACTIVE.
                         Err(Error::Scan(ScanError::RoleChanged)) => joining = Joining::on(&self.links, policy),
                         Err(error) => return Err(self.refused(error)),
                     }

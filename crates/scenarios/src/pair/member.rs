@@ -25,7 +25,7 @@ pub(super) fn member(links: HostLinks, board: &Board) {
     run(links, board, LISTEN);
 }
 
-/// As [`member`], and does not listen before it becomes ACTIVE for the first time.
+/// As [`member`], but it does not listen before it becomes ACTIVE for the first time.
 pub(super) fn eager_member(links: HostLinks, board: &Board) {
     run(links, board, Duration::ZERO);
 }
@@ -133,7 +133,7 @@ fn work(data: &mut ProcessData<'_>, outputs: &[Range<usize>]) -> Shown {
     }
 }
 
-/// Shows a cycle on the board. Whether it took over through INIT.
+/// Shows a cycle on the board. Returns whether it took over through INIT.
 fn note(board: &Board, application: &mut Application<HostLinks>, shown: &Shown) -> bool {
     let mut events = Vec::new();
     let mut is_cold = false;

@@ -12,8 +12,8 @@ use super::outputs::Outputs;
 
 /// A step of a watchdog's divider.
 const WATCHDOG_STEP_NS: u64 = 40;
-/// A cycle: the log of outputs has those of a frame that ends damaged, too, because its sender has lost its power. They
-/// do not trigger the watchdog.
+/// A tolerance of one cycle: the log of outputs also has those of a frame that ends damaged because its sender has lost
+/// its power. They do not trigger the watchdog.
 const DAMAGED_NS: u64 = super::CYCLE.as_nanos() as u64;
 
 /// Checks states.

@@ -1,7 +1,7 @@
 //! Random runs of two MainDevices of the library: either program is killed, hangs, loses its power or its links, roles
-//! are handed over and requested, cables are cut, frames are lost. One fault at a time, from a ring that is whole, has
-//! a bar for the longest time without outputs; a second one meanwhile has only what holds always, and what follows
-//! when all is mended.
+//! are handed over and requested, cables are cut, frames are lost. A single fault, from a ring that is whole, has a
+//! limit for the longest time without outputs. With two faults at a time, only what holds always is checked, and that
+//! the ring is whole again after their end.
 //!
 //! `SEED=17 cargo test -p scenarios --test two_main_devices random_runs::seeds -- --nocapture` runs one seed.
 
@@ -94,7 +94,7 @@ struct Run {
     dice: Dice,
     cables: usize,
     detection: Duration,
-    /// The troubles of this round that are not mended, with the host that each has hit.
+    /// The faults of this round that have not ended, each with the host that it concerns.
     open: Vec<(Trouble, Host)>,
 }
 
@@ -122,7 +122,7 @@ impl Run {
         Host::ALL.into_iter().find(is_active).unwrap_or(Host::First)
     }
 
-    /// A trouble begins within the next cycle.
+    /// A fault begins within the next cycle.
     fn begin(&mut self, trouble: Trouble) {
         let moment = Duration::from_nanos(self.dice.below(CYCLE.as_nanos() as u64));
         let active = self.active();
@@ -164,7 +164,7 @@ impl Run {
         self.open.push((trouble, host));
     }
 
-    /// Ends all troubles, in any order.
+    /// Ends all faults, in any order.
     fn mend(&mut self) {
         while !self.open.is_empty() {
             let at = self.dice.below(self.open.len() as u64) as usize;
@@ -222,7 +222,7 @@ impl Run {
         panic!("no ACTIVE with a standby that is ready within 5,000 cycles\n{}", self.pair.log());
     }
 
-    /// One trouble, from a ring that is whole.
+    /// One fault, from a ring that is whole.
     fn round(&mut self) {
         let trouble = Trouble::any(&mut self.dice, self.cables);
         self.pair.take_longest_gap();
@@ -241,7 +241,7 @@ impl Run {
         assert_eq!(cold, before, "{trouble:?}: a takeover through INIT\n{}", self.pair.log());
     }
 
-    /// A second trouble before the first one is over.
+    /// A second fault before the first one has ended.
     fn double_round(&mut self) {
         let first = Trouble::any(&mut self.dice, self.cables);
         let second = Trouble::any(&mut self.dice, self.cables);
@@ -296,9 +296,9 @@ fn seeds_0_to_20_hold_under_faults_of_both_maindevices_and_the_cables() {
     run_all(0..20);
 }
 
-/// An ACTIVE that went through INIT although no other one was heard since (1, 2); two that scanned at the same time
-/// for ever (131); no more rounds of reads after a role that ended during one (826); a takeover while the other one
-/// scans, which did not yield (1307).
+/// Faults that were found: an ACTIVE went through INIT although it had heard no other one (1, 2); two scanned at the
+/// same time for ever (131); no more rounds of reads after a role that ended during one (826); no yield after a
+/// takeover during a scan of the other MainDevice (1307).
 // covers: standby, MR-10, MR-16
 #[test]
 fn seeds_that_found_faults_hold() {

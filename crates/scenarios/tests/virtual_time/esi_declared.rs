@@ -102,7 +102,7 @@ fn chosen_pdos_modules_and_values_are_in_the_devices_in_op() {
         application.links_mut().network_mut().device_mut(DeviceIndex(at)).application.record_mail();
     }
     application.wait_until_op(LIMIT).unwrap();
-    // The value and the start-up command come behind the PDOs, the list of modules before them (ES-125, ES-126).
+    // The value and the start-up command come after the PDOs, the list of modules before them (ES-125, ES-126).
     assert_eq!(written(application.links().network(), 2), [0x1C13, 0x8000]);
     assert_eq!(written(application.links().network(), 3), [0xF030, 0x6060]);
     let read = |at: usize, index, sub| {

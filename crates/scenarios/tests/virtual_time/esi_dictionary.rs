@@ -1,5 +1,5 @@
-//! What a simulated device of a description (ESI) says of its objects: names and bit lengths are those of the file,
-//! also of the objects that the simulator derives from the rest of the device.
+//! SDO information of a simulated device from a description (ESI): names and bit lengths are those of the file, also
+//! for the objects that the simulator derives from the rest of the device.
 
 use std::fs;
 

@@ -22,9 +22,9 @@ const PERIOD: Duration = Duration::from_millis(1);
 /// How a description fixes PDOs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fixed {
-    /// CoE neither assigns nor maps.
+    /// CoE permits neither assignment nor mapping.
     ByCoe,
-    /// CoE does both; the SyncManagers and the PDOs do not.
+    /// CoE permits both; the SyncManagers and the PDOs are fixed.
     BySyncManagers,
 }
 
@@ -82,7 +82,7 @@ fn scanned(fixed: Fixed, has_room: bool, pdos: ReadPdos) -> (MainDevice<Simulate
     (main_device, [automatic(&scan.subdevices, PERIOD), LoadedNetwork::new(file).declaration()])
 }
 
-/// The scenario is none if the device takes what is written.
+/// The scenario shows something only if the device refuses what is written.
 fn refuses(main_device: &mut MainDevice<SimulatedSegment>) {
     for index in [0x1C12, 0x1C13, 0x1600, 0x1A00] {
         let error = main_device.subdevice(Position(0)).sdo_write(index, 0, 0_u8).unwrap_err();

@@ -44,7 +44,7 @@ pub struct Pdo<'a> {
 impl<'a> Pdo<'a> {
     /// Bytes of a PDO without its entries.
     pub const HEADER_LEN: usize = 8;
-    /// Bit of [`Pdo::flags`]: its entries cannot be changed.
+    /// Bit of [`Pdo::flags`]: the entries of the PDO cannot be changed.
     pub const FIXED: u16 = 0x0010;
 
     /// Its entries in order.

@@ -40,7 +40,7 @@ pub struct Board {
     pub ring: RingState,
     /// Why it has ended.
     pub failure: Option<String>,
-    /// Events that were not taken.
+    /// Events that have not been printed yet.
     pub events: Vec<TimedEvent>,
 }
 
@@ -113,7 +113,8 @@ impl Images {
         self.kept.push_back(image.to_vec());
     }
 
-    /// Compares an image of the INACTIVE: its outputs are those of a cycle of the ACTIVE, and its inputs are.
+    /// Compares an image of the INACTIVE: its outputs are those of one cycle of the ACTIVE, its inputs those of one
+    /// cycle.
     fn compare(&mut self, image: &[u8], places: &[Place]) {
         let same = |of: fn(&Place) -> &Vec<Range<usize>>| {
             let is_of = |kept: &Vec<u8>| {
@@ -186,7 +187,7 @@ fn work(data: &mut ProcessData<'_>, layout: &Layout, drives: &mut [Drive], cycle
 /// Which images are compared.
 #[derive(Debug, Default)]
 struct Comparison {
-    /// The ACTIVE has said that this one could take over: before, its image may be empty.
+    /// The ACTIVE has reported that this one could take over: before that its image may be empty.
     has_begun: bool,
     was_active: bool,
 }

@@ -19,7 +19,7 @@ use super::super::drive::Drive;
 use super::super::watch::{device_at, pattern};
 use super::controller::{Place, number_at};
 
-/// Outputs may be taken this many cycles after the beginning of theirs.
+/// Outputs may be taken up to this many cycles after the beginning of their cycle.
 const MAX_AGE: i64 = 3;
 /// Most faults that are described; further ones are only counted.
 const DESCRIBED: usize = 3;
@@ -73,7 +73,7 @@ pub struct Judge {
     pub checked: u64,
     /// Outputs that were older than those before, or older than allowed.
     pub outdated: u64,
-    /// Looks at a drive that was not enabled.
+    /// How often a drive was not enabled that had been enabled before.
     pub disabled: u64,
     /// The first faults in words.
     pub described: Vec<String>,
@@ -153,7 +153,7 @@ impl Judge {
                 self.outputs(position, it, access);
             }
         }
-        // A SubDevice that takes none at all has no end of the time between outputs.
+        // If a SubDevice takes no more outputs, the time since the last ones counts.
         if let (Some(longest), Some(last)) = (it.longest.last_mut(), it.last) {
             *longest = (*longest).max(now - last);
         }

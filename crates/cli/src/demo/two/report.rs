@@ -22,7 +22,7 @@ const NAME: usize = 12;
 /// Cycles in which both controllers may send: one yields.
 const MOST_TOGETHER: u32 = 2;
 
-/// An incident that was.
+/// An incident that has happened.
 #[derive(Debug)]
 pub struct Incident {
     /// Its number, from 1.
@@ -205,7 +205,7 @@ fn of_subdevices(judge: &Judge) -> Vec<Check> {
         let held = judge.disabled == 0 && drives.iter().all(|drive| drive.was_enabled);
         let text = match held {
             true => "the drives stayed enabled and went on".to_owned(),
-            false => format!("drives were not enabled: in {} cycles together", judge.disabled),
+            false => format!("drives were not enabled, in {} cycles in all", judge.disabled),
         };
         checks.push(Check { held, text });
     }

@@ -79,11 +79,11 @@ impl Step {
             Step::Calm => format!("{active} is ACTIVE, {other} follows and is ready to take over"),
             Step::Kill => format!("killing {active}; its guard takes its links down"),
             Step::Restart => format!("starting {other} again"),
-            Step::HandOver => format!("{active} is to hand its role over to {other}"),
-            Step::HandOverAndCut => format!("{active} is to hand its role over; {cable} is cut meanwhile"),
+            Step::HandOver => format!("{active} hands its role over to {other}"),
+            Step::HandOverAndCut => format!("{active} hands its role over; {cable} is cut meanwhile"),
             Step::Repair => format!("repairing {cable}"),
             Step::PowerOff => format!("the computer of {active} loses its power"),
-            Step::PowerOn => format!("power for the computer of {other}, which starts its program"),
+            Step::PowerOn => format!("the computer of {other} gets its power back and starts its program"),
         }
     }
 
@@ -108,8 +108,8 @@ impl Step {
         match self {
             // None is missing; the grid of cycles moves when the role does.
             Step::Calm | Step::HandOver => cycle + cycle * 3 / 5,
-            // The time-out counts from the last process data, and a cycle of the other one begins after it. Of several
-            // frames the first one counts as heard.
+            // The time-out counts from the last process data, and a cycle of the other one begins after it. If a cycle
+            // has several frames, the first one counts as heard.
             Step::Kill | Step::PowerOff => cycle * (time_out_cycles + 1 + u32::from(several_frames)),
             // Two are missing at most where a cable is cut or a link comes up.
             Step::Restart | Step::HandOverAndCut | Step::Repair | Step::PowerOn => cycle * 3,

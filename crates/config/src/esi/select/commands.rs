@@ -14,7 +14,7 @@ const MODULE_IDENTS: u16 = 0xF030;
 /// Start-up commands of all modules, at most.
 const MAX_COMMANDS: usize = 1 << 16;
 
-/// All commands: the list of modules, then behind the PDOs those of the description, then the parameters.
+/// All commands: the list of modules, then, after the PDOs, those of the description and the parameters.
 pub(super) fn commands(work: &mut Work<'_>) -> Result<Vec<SelectedCommand>, EsiError> {
     let mut commands = module_idents(work);
     let device = work.device;
@@ -53,7 +53,7 @@ pub(super) fn commands(work: &mut Work<'_>) -> Result<Vec<SelectedCommand>, EsiE
     for parameter in &work.choices.parameters {
         commands.push(parameter_command(work, parameter)?);
     }
-    // A description that writes the PDOs itself: the engine corrects them to what was chosen.
+    // If one of them writes PDOs, all are sent before: the engine then corrects the PDOs to what was chosen.
     let before_pdos =
         commands.iter().any(|it| matches!(it.message, SelectedMessage::Sdo(index, ..) if is_of_pdos(index)));
     commands.iter_mut().for_each(|command| command.before_pdos |= before_pdos);

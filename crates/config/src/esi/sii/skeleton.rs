@@ -26,7 +26,7 @@ const PROTOCOLS: u16 = MailboxProtocols::AOE
 pub struct Skeleton {
     /// Its text.
     pub text: String,
-    /// What a description cannot say of the mailboxes of the image.
+    /// What a description cannot express about the mailboxes of the image.
     pub notices: Vec<String>,
 }
 
@@ -259,7 +259,7 @@ fn has_mailbox(sii: &Sii<'_>) -> bool {
     header.protocols.0 != 0 || header.standard_mailbox != MailboxLayout::default()
 }
 
-/// A description has the mailboxes of its SyncManagers, and the protocols that have an element.
+/// What a description cannot express: it has only the mailboxes of its SyncManagers, and protocols with an element.
 fn unsaid(sii: &Sii<'_>) -> Vec<String> {
     if !has_mailbox(sii) {
         return Vec::new();

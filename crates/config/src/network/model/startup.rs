@@ -15,7 +15,7 @@ pub struct Startup {
     /// The transition; PS if the key is missing.
     #[serde(default)]
     pub at: At,
-    /// At PS: it is sent behind the PDO assignment and mapping; before them if the key is missing.
+    /// At PS: it is sent after the PDO assignment and mapping; before them if the key is missing.
     #[serde(default)]
     pub after_pdos: bool,
     /// SDO download.

@@ -9,9 +9,9 @@ use crate::network::model::{Pdo, Protocol, SubDevice};
 /// PDO assignment of SyncManager n.
 const ASSIGNMENT: u16 = 0x1C10;
 
-/// Puts them between the start-up commands of the file before the PDOs and those behind, as the engine sends them,
-/// unless the file has some of its own. Where an ENI cannot have this order, they are directly behind the other
-/// commands of CoE: false.
+/// Puts them after the start-up commands of the file without `after_pdos` and before the others, as the engine sends
+/// them, unless the file has such commands itself. If an ENI cannot have this order, they directly follow the other
+/// commands of CoE, and the result is false.
 pub(super) fn place(startup: &mut Vec<StartupCommand>, of: &SubDevice) -> bool {
     let commands = commands(startup, of);
     if commands.is_empty() {
@@ -30,13 +30,13 @@ pub(super) fn place(startup: &mut Vec<StartupCommand>, of: &SubDevice) -> bool {
     is_exact
 }
 
-/// Whether a command of CoE is sent at PS before the PDOs.
+/// Whether it is a command of CoE that is sent at PS before the PDOs.
 fn is_coe_before(command: &StartupCommand) -> bool {
     let is_coe = matches!(command.action, StartupAction::Sdo(_) | StartupAction::Upload(_));
     is_coe && command.transition == Transition::Ps && !command.after_pdos
 }
 
-/// None without CoE, and if start-up commands write the objects.
+/// The commands that assign and map PDOs; none without CoE, and none if start-up commands write these objects.
 fn commands(startup: &[StartupCommand], of: &SubDevice) -> Vec<StartupCommand> {
     let Some(mailbox) = of.mailbox.as_ref().filter(|mailbox| mailbox.protocols.contains(&Protocol::CoE)) else {
         return Vec::new();

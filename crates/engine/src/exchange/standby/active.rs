@@ -95,7 +95,7 @@ impl Exchange {
         }
     }
 
-    /// As [`Exchange::note_foreign`], of the frames that the acyclic half has received.
+    /// As [`Exchange::note_foreign`], for a frame that the acyclic half has received.
     pub(super) fn note_acyclic_collision(&mut self) {
         let Some(state) = self.standby.0.as_deref() else { return };
         if let Some((arrived_on, source)) = state.words.take_collision() {

@@ -75,7 +75,8 @@ impl Exchange {
         Some(role)
     }
 
-    /// This MainDevice controls the bus from this cycle on, with the outputs and inputs that the other one had.
+    /// This MainDevice controls the bus from this cycle on, with the outputs and inputs that the other one had, or with
+    /// its own last ones.
     fn take_over(&mut self, now: Instant) {
         let left = self.cycle + 1;
         let Some(state) = self.standby.0.as_deref_mut() else { return };
@@ -134,15 +135,15 @@ impl State {
         self.control.set(role);
     }
 
-    /// Whether SubDevices can go on as they were left: their registers are those of this configuration. Otherwise they
-    /// are configured again from INIT on, which is a warm takeover (protocol MR-18).
+    /// What this MainDevice goes on with as ACTIVE. SubDevices stay as they are only if their registers are those of
+    /// this configuration; otherwise they are configured again from INIT on, which is a warm takeover (protocol MR-18).
     fn takeover(&self) -> Takeover {
         let (own, heard_at) = (&self.frames.header, self.words.heard_at());
         let is_same = |other: &Header| other.identity == own.identity && other.session == own.session;
         match self.following.whole() {
             _ if self.goes_through_init => Takeover::ThroughInit,
             Some(whole) if is_same(&whole.header) => Takeover::FromOther,
-            // A frame that came in the moment of the change may be of another ACTIVE.
+            // A frame that came at the time of the change counts as heard: it may be that of another ACTIVE.
             None if self.left_at.is_some_and(|left| heard_at.is_none_or(|at| at < left)) => Takeover::FromItself,
             _ => Takeover::ThroughInit,
         }

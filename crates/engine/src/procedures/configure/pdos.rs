@@ -55,7 +55,7 @@ impl BringUp<'_> {
     }
 
     /// Whether the dictionary holds what is known of it: it is as at power-on, and no start-up command has written it.
-    /// An SII without any PDO says nothing of it.
+    /// An SII without any PDO says nothing about it.
     fn is_dictionary_known(&self) -> bool {
         let view = self.segment.view();
         let info = view.member(self.index).and_then(|member| member.info);

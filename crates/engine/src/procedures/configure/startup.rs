@@ -26,7 +26,7 @@ impl BringUp<'_> {
         self.command_those(transition, |_| true).await
     }
 
-    /// Sends the commands of PS before the PDOs are written, or those behind.
+    /// Sends the commands of PS that come before the PDO assignment and mapping, or those that come after them.
     pub(super) async fn command_pdos(&self, is_after: bool) -> Result<(), ConfigureError> {
         self.command_those(Transition::Ps, |command| command.is_after_pdos() == is_after).await
     }

@@ -75,7 +75,7 @@ impl Segment {
     }
 
     /// Another MainDevice controls the bus: it restores what was altered for a moment. Attempts, rounds of reads and
-    /// searches have ended without a result, and begin again when this one controls it.
+    /// searches have ended without a result; they begin again when this MainDevice controls the bus.
     fn yield_bus(&mut self) {
         self.slot = self.slot.emptied();
         self.altered.clear();

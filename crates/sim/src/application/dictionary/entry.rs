@@ -44,7 +44,7 @@ pub struct Entry {
     /// Unit for SDO information.
     unit: Option<u16>,
     default: Option<Vec<u8>>,
-    /// Bits of the value, where they are not those of the type or of all its bytes.
+    /// Bits of the value, if they are neither those of the type nor those of all its bytes.
     bits: Option<u16>,
 }
 
@@ -83,7 +83,7 @@ impl Entry {
         Entry { more_rights: self.more_rights | rights, ..self }
     }
 
-    /// The same entry with this number of bits, for example 3 of an enumeration in a byte; 0 is no statement.
+    /// The same entry with this number of bits, for example 3 for an enumeration in a byte; 0: not stated.
     pub fn of_bits(self, bits: u16) -> Entry {
         Entry { bits: Some(bits).filter(|bits| *bits != 0), ..self }
     }

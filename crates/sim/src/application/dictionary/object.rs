@@ -74,7 +74,7 @@ impl Object {
         }
     }
 
-    /// Takes over the names that the description of a device has for this object and its entries.
+    /// Takes the names that the device description has for this object and its entries.
     pub fn named_by(&mut self, description: &Object) {
         if !description.name.is_empty() {
             self.name.clone_from(&description.name);
