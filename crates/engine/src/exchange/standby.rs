@@ -37,6 +37,8 @@ impl Exchange {
             return;
         }
         let StandbySetup { planned, items, identity, session, exchanges_from, control, words, .. } = setup;
+        // One of an application before.
+        words.take_collision();
         let period = layout.home().map_or(0, |home| layout.domains[home].period.as_nanos() as u64);
         let items = Items::new(identity, items);
         let mut header = Header::new();
@@ -58,6 +60,7 @@ impl Exchange {
             offered: 0,
             shown: None,
             foreign_in: 0,
+            acyclic_counts_from: 0,
             collided_with: None,
             other_version: None,
             noticed: None,

@@ -67,6 +67,12 @@ impl HotConnect {
         }
     }
 
+    /// The task that takes the cabling over has ended without a result.
+    #[cfg(feature = "standby")]
+    pub fn end_following(&mut self) {
+        self.is_following = false;
+    }
+
     /// The cabling was taken over as of this number of changes.
     pub fn follow(&mut self, changes: u32) {
         self.followed = changes;

@@ -98,7 +98,9 @@ impl Exchange {
     /// As [`Exchange::note_foreign`], for a frame that the acyclic half has received.
     pub(super) fn note_acyclic_collision(&mut self) {
         let Some(state) = self.standby.0.as_deref() else { return };
-        if let Some((arrived_on, source)) = state.words.take_collision() {
+        if let Some((arrived_on, source)) = state.words.take_collision()
+            && self.cycle >= state.acyclic_counts_from
+        {
             self.note_collision(arrived_on, source);
         }
     }

@@ -15,6 +15,9 @@ use crate::link::Link;
 use crate::role::{MainDeviceRole, RoleCause, RoleRequest};
 use crate::time::Instant;
 
+/// Acyclic frames of the ACTIVE before may be read for this time after a takeover.
+const LAST_FRAMES_NS: u64 = 100_000_000;
+
 /// What the beginning of a cycle does to the role.
 enum Change {
     None,
@@ -99,6 +102,7 @@ impl Exchange {
             state.frames.cycle = cycle;
         }
         state.frames.header.phase = Phase::Goes;
+        state.acyclic_counts_from = left + LAST_FRAMES_NS.div_ceil(state.period_ns.max(1));
         state.become_role(MainDeviceRole::Active);
         let is_hot = takeover != Takeover::ThroughInit;
         self.events.push(CyclicStandbyEvent::TookOver { silence, in_state, is_hot }.pack());

@@ -1,10 +1,14 @@
 //! Another MainDevice of the ring has controlled the bus, or does so from now on (protocol MR-16, MR-18).
 
+use alloc::vec::Vec;
+
 use ringcat_wire::al::{AlState, AlStatus};
 
 use crate::board::live::{Life, Presence};
 use crate::segment::attention::Attention;
 use crate::segment::effect::{Check, Effects, Watch};
+use crate::segment::key::SubDeviceKey;
+use crate::segment::knowledge::Knowledge;
 use crate::segment::member::Phase;
 use crate::segment::model::Segment;
 use crate::segment::observation::StandbyObservation;
@@ -31,6 +35,7 @@ impl Segment {
         if let Some(scanned) = self.stage.scanned_mut() {
             scanned.registers = Start::Doubtful;
         }
+        self.end_tasks();
         if !is_hot {
             return self.begin_procedures(effects);
         }
@@ -80,8 +85,19 @@ impl Segment {
         self.slot = self.slot.emptied();
         self.altered.clear();
         self.port_controls.clear();
+        self.end_tasks();
+    }
+
+    /// All tasks have ended without a result, and begin again when they are needed. At the beginning of a role as well:
+    /// a role that is given up and taken again at once shows no end.
+    fn end_tasks(&mut self) {
         self.attention = Attention::default();
         self.crossings.end_search();
+        self.hot_connect.end_following();
+        // Those that were being read get another address, and are read again.
+        let unread = |(key, knowledge, _): (SubDeviceKey, &mut Knowledge, _)| knowledge.info().is_none().then_some(key);
+        let unread: Vec<SubDeviceKey> = self.subdevices.all_unassigned_mut().filter_map(unread).collect();
+        self.subdevices.remove(|key| unread.contains(&key));
         for member in self.subdevices.members_mut() {
             member.attempt = member.attempt.wrapping_add(1);
         }

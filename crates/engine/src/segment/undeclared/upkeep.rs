@@ -71,7 +71,9 @@ impl Upkeep {
     #[cfg(feature = "standby")]
     pub(in crate::segment) fn end_attempt(&mut self) {
         self.attempt = self.attempt.wrapping_add(1);
-        if self.progress == UpkeepProgress::UnderWay {
+        // In OP its outputs were written by an attempt.
+        let is_in_op = self.progress == UpkeepProgress::Reached && self.target == AlState::Op;
+        if self.progress == UpkeepProgress::UnderWay || is_in_op {
             self.progress = UpkeepProgress::Due(Instant::default());
         }
         if self.reading == PdoReading::UnderWay {
