@@ -37,11 +37,11 @@ use steps::{STEPS, Step, Times, cable_to_cut, name};
 const TIME_OUT_CYCLES: u32 = 3;
 /// How long the first controller listens at the start.
 const FIRST_LISTENS: Duration = Duration::from_millis(10);
-/// How long each of them listens later on.
-const LISTEN: Duration = Duration::from_millis(500);
+/// How long each of them listens later on, at least, and in cycles.
+const LISTEN: (Duration, u32) = (Duration::from_millis(500), 10);
 /// How long an incident lasts at least, in milliseconds, and in cycles.
 const LASTS: (u64, u32) = (400, 50);
-/// Until all SubDevices are in OP at the most, and until an incident is over.
+/// Until all SubDevices are in OP at the most, and until an incident is over; beside some time-outs.
 const LIMIT: Duration = Duration::from_secs(30);
 /// Bytes of process data that fit into the frame of a cycle.
 const ONE_FRAME: usize = 1_400;
@@ -116,10 +116,11 @@ fn with_two_hosts(mut segment: Segment) -> Result<Segment, Failure> {
 impl Two {
     fn run(mut self) -> Result<Report, Failure> {
         self.start(Host::First, FIRST_LISTENS)?;
-        self.start(Host::Second, LISTEN)?;
+        self.start(Host::Second, self.listen())?;
         if !self.until(Duration::ZERO, true, true) {
             let why = self.why_not(true, true).unwrap_or_default();
-            let text = format!("not all SubDevices in OP with two controllers within {} s: {why}", LIMIT.as_secs());
+            let text =
+                format!("not all SubDevices in OP with two controllers within {} s: {why}", self.limit().as_secs());
             return Ok(self.report(Verdict::Failed(text)));
         }
         self.begin_to_judge();
@@ -192,7 +193,7 @@ impl Two {
         match step {
             Step::Calm => {}
             Step::Kill => self.kill(active),
-            Step::Restart => self.start(active.other(), LISTEN)?,
+            Step::Restart => self.start(active.other(), self.listen())?,
             Step::HandOver => self.hand_over(),
             Step::HandOverAndCut => {
                 self.hand_over();
@@ -208,7 +209,7 @@ impl Two {
             Step::PowerOn => {
                 self.hosts.dismiss_guard(active.other());
                 self.hosts.apply(Fault::PowerHostOn(active.other()));
-                self.start(active.other(), LISTEN)?;
+                self.start(active.other(), self.listen())?;
             }
         }
         if step.changes_role() {
@@ -236,15 +237,24 @@ impl Two {
         }
     }
 
+    fn listen(&self) -> Duration {
+        let (least, cycles) = LISTEN;
+        least.max(self.times.cycle * cycles)
+    }
+
+    fn limit(&self) -> Duration {
+        LIMIT + self.times.cycle * self.times.time_out_cycles.saturating_mul(4)
+    }
+
     /// Lets at least this time pass, until all is as it should be. False if that takes too long.
     fn until(&mut self, least: Duration, two: bool, ring: bool) -> bool {
         let begin = self.hosts.now();
-        while self.hosts.now().since(begin) < LIMIT.max(least) {
+        while self.hosts.now().since(begin) < self.limit().max(least) {
             self.pass(self.times.cycle);
             if self.hosts.now().since(begin) >= least && self.why_not(two, ring).is_none() {
                 return true;
             }
-            if self.judge.is_none() && Host::ALL.iter().any(|host| self.shared.board(*host).failure.is_some()) {
+            if Host::ALL.iter().any(|host| self.shared.board(*host).failure.is_some()) {
                 return false;
             }
         }

@@ -4,6 +4,8 @@ mod addressed;
 mod clocks;
 mod idle;
 mod posted;
+#[cfg(feature = "standby")]
+mod roles;
 mod stages;
 mod stale;
 mod undeclared;

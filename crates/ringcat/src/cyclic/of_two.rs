@@ -99,6 +99,7 @@ impl Cyclic {
             role: exchange.role(),
             inactive_since: of_two.inactive_since,
             heard_at: of_two.heard_at,
+            heard_any_at: exchange.heard_any_at(),
             collided_with: exchange.take_collision(),
         };
         if let Some(request) = watch.decide(&situation, now)

@@ -1,6 +1,8 @@
 //! A simulated device from a description: the SII image as a tool writes it, the PDOs (also those of modules, and those
 //! without room in the image), the object dictionary with its defaults.
 
+use std::collections::BTreeSet;
+
 use ringcat_config::esi::sii::{SiiOptions, SiiProfile, build, code_of};
 use ringcat_config::esi::{Device, Esi, Pdo, PlacedModule, SyncManagerRole, place_modules};
 use ringcat_sim::description::{DeviceDescription, PdoDescription, PdoEntryDescription};
@@ -107,12 +109,17 @@ fn add_modules(
     Ok(())
 }
 
-/// Adds the copies of PDOs with oversampling (protocol ES-47), as many as may be assigned. No copy is assigned by
-/// default.
+/// Bytes that the copies of PDOs of a device may take together, with their names.
+const COPIES: usize = 16 << 20;
+
+/// Adds the copies of PDOs with oversampling (protocol ES-47), as many as may be assigned and have room. No copy is
+/// assigned by default.
 fn add_copies(device: &Device, description: &mut DeviceDescription) {
     let modes = device.clock.iter().flat_map(|clock| &clock.modes).flat_map(|mode| &mode.sync_managers);
     let of_modes: Vec<(u16, u32)> =
         modes.flat_map(|sm| &sm.pdos).filter_map(|(index, factor)| Some((*index, (*factor)?))).collect();
+    let mut indices_used: BTreeSet<u16> = description.pdos.iter().map(|pdo| pdo.index).collect();
+    let mut room = COPIES;
     for pdo in device.rx_pdos.iter().chain(&device.tx_pdos) {
         let Some([default, _, most, distance]) = pdo.oversampling else { continue };
         let Some(own) = description.pdos.iter().find(|it| it.index == pdo.index.index).cloned() else { continue };
@@ -126,11 +133,19 @@ fn add_copies(device: &Device, description: &mut DeviceDescription) {
         let indices = indices.take_while(|index| range.contains(index)).filter_map(|index| u16::try_from(index).ok());
         // With a distance of 0 the first copy has the index of the PDO itself; above 0 no index repeats.
         for index in indices.take_while(|index| *index != own.index) {
-            if description.pdos.iter().all(|it| it.index != index) {
+            if indices_used.insert(index) {
+                let Some(left) = room.checked_sub(size(&own)) else { return };
+                room = left;
                 description.pdos.push(PdoDescription { index, sync_manager: None, ..own.clone() });
             }
         }
     }
+}
+
+/// Bytes of a PDO in memory.
+fn size(pdo: &PdoDescription) -> usize {
+    let entries = pdo.entries.iter().map(|entry| size_of_val(entry) + entry.name.len());
+    size_of_val(pdo) + pdo.name.len() + entries.sum::<usize>()
 }
 
 #[cfg(test)]

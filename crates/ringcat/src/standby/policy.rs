@@ -118,6 +118,8 @@ pub(crate) struct Situation {
     pub inactive_since: Instant,
     /// When process data of the other MainDevice came last since then.
     pub heard_at: Option<Instant>,
+    /// When any frame of another MainDevice came last.
+    pub heard_any_at: Option<Instant>,
     /// The other one, of which a frame came while this one is ACTIVE.
     pub collided_with: Option<MacAddress>,
 }
@@ -153,7 +155,9 @@ impl Watch {
                     Some(_) => self.time_out,
                     None => self.time_out + self.pause_of(situation.inactive_since),
                 };
-                let silent_since = situation.heard_at.unwrap_or(situation.inactive_since);
+                // Until it has sent process data, an ACTIVE may be scanning. Then only process data counts.
+                let any = situation.heard_any_at.unwrap_or(Instant(0));
+                let silent_since = situation.heard_at.unwrap_or(situation.inactive_since.max(any));
                 let is_over = self.policy.takes_over && now.since(silent_since) >= limit;
                 is_over.then_some(RoleRequest::Active)
             }
@@ -213,7 +217,13 @@ mod tests {
 
     fn inactive(heard_at: Option<u64>) -> Situation {
         let heard_at = heard_at.map(|ms| Instant(ms * MS));
-        Situation { role: MainDeviceRole::Inactive, inactive_since: Instant(0), heard_at, collided_with: None }
+        Situation {
+            role: MainDeviceRole::Inactive,
+            inactive_since: Instant(0),
+            heard_at,
+            heard_any_at: None,
+            collided_with: None,
+        }
     }
 
     fn collided(last: u8) -> Situation {
@@ -231,6 +241,17 @@ mod tests {
         assert_eq!(held.decide(&inactive(Some(100)), Instant(900_000 * MS)), None);
         let least = Policy::default().with_time_out(0, Duration::ZERO);
         assert_eq!(least.time_out_of(Duration::from_millis(4)), Duration::from_millis(12), "a cable may be cut");
+    }
+
+    // covers: standby, MR-08
+    #[test]
+    fn an_active_that_has_sent_no_process_data_yet_may_be_scanning() {
+        let mut watch = watch(Policy::default());
+        let scans = Situation { heard_any_at: Some(Instant(90 * MS)), ..inactive(None) };
+        assert_eq!(watch.decide(&scans, Instant(105 * MS - 1)), None);
+        assert_eq!(watch.decide(&scans, Instant(120 * MS)), Some(RoleRequest::Active), "it has ended");
+        let hangs = Situation { heard_any_at: Some(Instant(114 * MS)), ..inactive(Some(100)) };
+        assert_eq!(watch.decide(&hangs, Instant(115 * MS)), Some(RoleRequest::Active), "its cycles hang");
     }
 
     // covers: standby, 9.9

@@ -298,11 +298,11 @@ fn seeds_0_to_20_hold_under_faults_of_both_maindevices_and_the_cables() {
 
 /// Faults that were found: an ACTIVE went through INIT although it had heard no other one (1, 2); two scanned at the
 /// same time for ever (131); no more rounds of reads after a role that ended during one (826); no yield after a
-/// takeover during a scan of the other MainDevice (1307).
+/// takeover during a scan of the other MainDevice (1307); a takeover each time-out during such a scan (4614).
 // covers: standby, MR-10, MR-16
 #[test]
 fn seeds_that_found_faults_hold() {
-    run_all([1, 2, 131, 826, 1307]);
+    run_all([1, 2, 131, 826, 1307, 4614]);
 }
 
 // covers: standby

@@ -31,6 +31,12 @@ impl Exchange {
     pub fn heard_at(&self) -> Option<Instant> {
         self.standby.0.as_deref()?.following.newest().map(|(_, at)| at)
     }
+
+    /// When a frame of another MainDevice came last while this one was INACTIVE, whatever it contains: one that scans
+    /// sends no process data yet.
+    pub fn heard_any_at(&self) -> Option<Instant> {
+        self.standby.0.as_deref()?.words.heard_at()
+    }
 }
 
 impl State {

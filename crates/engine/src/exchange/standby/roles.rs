@@ -15,7 +15,7 @@ use crate::link::Link;
 use crate::role::{MainDeviceRole, RoleCause, RoleRequest};
 use crate::time::Instant;
 
-/// Acyclic frames of the ACTIVE before may be read for this time after a takeover.
+/// Acyclic frames of the ACTIVE before may be read for this time after it has handed its role over.
 const LAST_FRAMES_NS: u64 = 100_000_000;
 
 /// What the beginning of a cycle does to the role.
@@ -72,7 +72,7 @@ impl Exchange {
         let event = CyclicStandbyEvent::RoleChanged(role, cause);
         self.events.push(event.pack());
         match role {
-            MainDeviceRole::Active => self.take_over(now),
+            MainDeviceRole::Active => self.take_over(now, cause),
             MainDeviceRole::Inactive => self.yield_role(now),
         }
         Some(role)
@@ -80,7 +80,7 @@ impl Exchange {
 
     /// This MainDevice controls the bus from this cycle on, with the outputs and inputs that the other one had, or with
     /// its own last ones.
-    fn take_over(&mut self, now: Instant) {
+    fn take_over(&mut self, now: Instant, cause: RoleCause) {
         let left = self.cycle + 1;
         let Some(state) = self.standby.0.as_deref_mut() else { return };
         let last = state.following.newest();
@@ -102,7 +102,8 @@ impl Exchange {
             state.frames.cycle = cycle;
         }
         state.frames.header.phase = Phase::Goes;
-        state.acyclic_counts_from = left + LAST_FRAMES_NS.div_ceil(state.period_ns.max(1));
+        let last_frames = if cause == RoleCause::HandedOver { LAST_FRAMES_NS } else { 0 };
+        state.acyclic_counts_from = left + last_frames.div_ceil(state.period_ns.max(1));
         state.become_role(MainDeviceRole::Active);
         let is_hot = takeover != Takeover::ThroughInit;
         self.events.push(CyclicStandbyEvent::TookOver { silence, in_state, is_hot }.pack());
