@@ -186,8 +186,8 @@ demo() {
     cargo run --release
     cargo run --release -- demo --standby
     small ringcat 10300000 || too_large=1
-    small ringcatd 6900000 || too_large=1
-    small ethercat 1770000 || too_large=1
+    small ringcatd 6850000 || too_large=1
+    small ethercat 1760000 || too_large=1
     return "$too_large"
 }
 
