@@ -61,8 +61,8 @@ pub(in crate::exchange) struct State {
     pub shown: Option<u32>,
     /// Cycle, plus one, in which a frame of another MainDevice came last while this one is ACTIVE.
     pub foreign_in: u64,
-    /// From this cycle on acyclic frames of another MainDevice are a collision: before, they may be the last ones of the
-    /// ACTIVE that has handed its role over.
+    /// From this cycle on acyclic frames of another MainDevice are a collision: before, they may be the last ones of
+    /// the ACTIVE that has handed its role over.
     pub acyclic_counts_from: u64,
     /// Its sender, until the application has asked for it.
     pub collided_with: Option<MacAddress>,
