@@ -360,12 +360,7 @@ impl MainDevice {
 
     /// Receives a frame of the acyclic half.
     pub fn receive(&mut self, arrived_on: Link, bytes: &[u8], now: Instant) -> Received {
-        let received = self.supervisor.receive(arrived_on, bytes, now);
-        #[cfg(feature = "standby")]
-        if received == Received::Foreign {
-            self.note_foreign(arrived_on, bytes, now);
-        }
-        received
+        self.supervisor.receive(arrived_on, bytes, now)
     }
 
     /// Sends acyclic frames within a byte budget; see [`Supervisor::transmit`].

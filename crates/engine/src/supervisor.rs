@@ -141,11 +141,19 @@ impl Supervisor {
             Classified::Ours(_) => Received::Cyclic,
             Classified::Foreign => {
                 shared.counters.foreign += 1;
+                #[cfg(feature = "standby")]
+                shared.note_foreign(arrived_on, bytes);
                 shared.events.push(now, Event::ForeignFrame { arrived_on, bytes: bytes.to_vec() });
                 Received::Foreign
             }
             Classified::Other => Received::Other,
         }
+    }
+
+    /// Takes link and source address of the last frame of another MainDevice since the last call.
+    #[cfg(feature = "standby")]
+    pub(crate) fn take_foreign(&mut self) -> Option<(Link, MacAddress)> {
+        self.shared.borrow_mut().foreign.take()
     }
 
     /// Gives up overdue frames, fires expired timers, and runs procedures until all of them wait.

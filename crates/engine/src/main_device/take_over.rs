@@ -36,6 +36,9 @@ impl MainDevice {
         if self.standby.is_none() {
             return;
         }
+        if let Some((arrived_on, source)) = self.supervisor.take_foreign() {
+            self.note_foreign(arrived_on, source, now);
+        }
         if self.active().is_none() {
             self.report_version(now);
             self.take_request(now);
@@ -70,15 +73,12 @@ impl MainDevice {
 
     /// A frame of another MainDevice has come while this one is ACTIVE: a collision (protocol MR-10). Without an
     /// application it is reported once for frames that follow each other; with one the cyclic half reports it.
-    pub(super) fn note_foreign(&mut self, arrived_on: Link, bytes: &[u8], now: Instant) {
+    fn note_foreign(&mut self, arrived_on: Link, source: MacAddress, now: Instant) {
         if self.role() != MainDeviceRole::Active {
             return;
         }
         let has_application = self.active().is_some();
-        let (Some(standby), Some(source)) = (&mut self.standby, bytes.get(6..).and_then(<[u8]>::first_chunk)) else {
-            return;
-        };
-        let source = MacAddress(*source);
+        let Some(standby) = &mut self.standby else { return };
         if has_application {
             return standby.words.post_collision(arrived_on, source);
         }

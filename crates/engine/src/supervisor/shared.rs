@@ -34,6 +34,9 @@ pub(crate) struct Shared {
     pub(crate) board: Option<Arc<Board>>,
     pub(crate) monitor: RingMonitor,
     pub(crate) counters: AcyclicCounters,
+    /// Link and source address of the last frame of another MainDevice.
+    #[cfg(feature = "standby")]
+    pub(crate) foreign: Option<(crate::link::Link, ringcat_wire::frame::MacAddress)>,
     pub(crate) events: EventLog,
     pub(crate) transfers: Transfers,
     pub(crate) command_reports: CommandReports,
@@ -65,6 +68,14 @@ pub(crate) struct Shared {
 }
 
 impl Shared {
+    /// Notes a frame of another MainDevice.
+    #[cfg(feature = "standby")]
+    #[cold]
+    pub(super) fn note_foreign(&mut self, arrived_on: crate::link::Link, bytes: &[u8]) {
+        let source = bytes.get(6..).and_then(<[u8]>::first_chunk);
+        self.foreign = source.map(|source| (arrived_on, ringcat_wire::frame::MacAddress(*source)));
+    }
+
     pub(crate) fn new(identity: Identity, links: LinkSet, now: Instant) -> Shared {
         Shared {
             now,
@@ -73,6 +84,8 @@ impl Shared {
             board: None,
             monitor: RingMonitor::default(),
             counters: AcyclicCounters::default(),
+            #[cfg(feature = "standby")]
+            foreign: None,
             events: EventLog::default(),
             transfers: Transfers::default(),
             command_reports: CommandReports::default(),

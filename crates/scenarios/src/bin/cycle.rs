@@ -33,10 +33,10 @@ const RING_BARS: [(&str, f64); 8] = [
     ("closed", 1_104.0),
     ("cut-main", 1_105.0),
     ("cut-redundant", 1_142.0),
-    ("sixteen-closed", 1_295.0),
-    ("sixteen-cut-main", 1_296.0),
-    ("sixteen-cut-middle", 1_502.0),
-    ("sixteen-cut-redundant", 1_335.0),
+    ("sixteen-closed", 1_289.0),
+    ("sixteen-cut-main", 1_290.0),
+    ("sixteen-cut-middle", 1_496.0),
+    ("sixteen-cut-redundant", 1_330.0),
     ("fifty-of-2-cut", 1_574.0),
 ];
 
