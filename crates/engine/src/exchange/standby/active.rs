@@ -88,7 +88,9 @@ impl Exchange {
     }
 
     /// A frame of another MainDevice has come: as ACTIVE a collision (protocol MR-10), reported once for frames that
-    /// follow each other.
+    /// follow each other. Out of line: it would cost the reception of own frames registers.
+    #[cold]
+    #[inline(never)]
     pub(in crate::exchange) fn note_foreign(&mut self, arrived_on: Link, bytes: &[u8]) {
         if let Some(source) = bytes.get(6..).and_then(<[u8]>::first_chunk) {
             self.note_collision(arrived_on, MacAddress(*source));
