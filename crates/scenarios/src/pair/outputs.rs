@@ -104,7 +104,10 @@ impl Outputs {
         for device in (0..self.taken.len()).map(DeviceIndex) {
             let last = self.taken[device.0].at;
             let controller = &network.device(device).controller;
-            for access in controller.logical_accesses().filter(|access| last.is_none_or(|last| access.at > last)) {
+            for access in controller
+                .logical_accesses()
+                .filter(|access| access.is_valid && last.is_none_or(|last| access.at > last))
+            {
                 self.check_access(device, access);
             }
         }
@@ -157,6 +160,7 @@ mod tests {
             address: 0,
             read: false,
             written: true,
+            is_valid: true,
             data: vec![of_cycle, 0],
             moved,
         };

@@ -12,9 +12,8 @@ use super::outputs::Outputs;
 
 /// A step of a watchdog's divider.
 const WATCHDOG_STEP_NS: u64 = 40;
-/// A tolerance of one cycle: the log of outputs also has those of a frame that ends damaged because its sender has lost
-/// its power. They do not trigger the watchdog.
-const DAMAGED_NS: u64 = super::CYCLE.as_nanos() as u64;
+/// The longest frame: the log has the time of its first bit, and its end triggers the watchdog.
+const FRAME_NS: u64 = 125_000;
 
 /// Checks states.
 #[derive(Debug)]
@@ -49,7 +48,7 @@ impl States {
             let allowed = watchdog_ns(is);
             let name = device.0;
             assert!(
-                silent.saturating_add(DAMAGED_NS) >= allowed,
+                silent.saturating_add(FRAME_NS) >= allowed,
                 "device {name} leaves OP for {to} ({}) after {silent} ns without outputs, watchdog {allowed}",
                 is.al_status_code()
             );

@@ -34,6 +34,9 @@ pub struct LogicalAccess {
     pub read: bool,
     /// Whether the SubDevice took outputs.
     pub written: bool,
+    /// Whether its frame has ended without an error. SyncManagers take no outputs of another one, and do not trigger a
+    /// watchdog.
+    pub is_valid: bool,
     /// The data when the datagram left the SubDevice.
     pub data: Vec<u8>,
     /// Copied pieces: a SubDevice increments the working counter once for all reads, even if SyncManagers refuse a
@@ -72,6 +75,8 @@ pub(super) struct LogicalLog {
     kept: Option<VecDeque<LogicalAccess>>,
     /// Moves of the datagram that is being processed.
     moved: Vec<Moved>,
+    /// The newest accesses, of the frame that is being processed.
+    open: usize,
 }
 
 impl LogicalLog {
@@ -101,6 +106,17 @@ impl LogicalLog {
             kept.pop_front();
         }
         kept.push_back(access);
+        self.open += 1;
+    }
+
+    /// The frame that is being processed has ended.
+    #[inline]
+    pub fn end_frame(&mut self, good: bool) {
+        let open = core::mem::take(&mut self.open);
+        if good && open > 0 {
+            let accesses = self.kept.iter_mut().flat_map(|kept| kept.iter_mut().rev());
+            accesses.take(open).for_each(|access| access.is_valid = true);
+        }
     }
 
     pub fn accesses(&self) -> impl Iterator<Item = &LogicalAccess> {

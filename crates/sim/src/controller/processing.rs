@@ -59,8 +59,10 @@ impl Controller {
             self.datagram(bytes, *place);
         }
         mark_processed(frame, rule);
+        let is_good = frame.fcs == Fcs::Good && !frame.malformed;
+        self.logical_log.end_frame(is_good);
         if !self.pass.is_idle() {
-            self.finish_frame(frame.fcs == Fcs::Good && !frame.malformed, now);
+            self.finish_frame(is_good, now);
         }
         true
     }
@@ -220,7 +222,9 @@ impl Controller {
             _ => (added & 1 != 0, added & 2 != 0),
         };
         let (at, data) = (self.pass.start, data.to_vec());
-        self.logical_log.note(LogicalAccess { at, identity, frame, command, address, read, written, data, moved });
+        let is_valid = false;
+        let access = LogicalAccess { at, identity, frame, command, address, read, written, is_valid, data, moved };
+        self.logical_log.note(access);
     }
 
     fn log_moved(&mut self, piece: Piece, first: u64, write: bool) {

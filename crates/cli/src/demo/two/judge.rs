@@ -41,6 +41,8 @@ pub struct Watched {
     pub was_enabled: bool,
     /// Longest time between outputs, per incident; empty without process data.
     pub longest: Vec<Duration>,
+    /// New target positions that a drive has taken, per incident.
+    targets: Vec<u32>,
     /// Changes of its state.
     pub state_changes: u32,
     /// Watchdogs that expired.
@@ -110,6 +112,7 @@ impl Judge {
         for watched in self.watched.iter_mut().filter(|watched| areas(&watched.place) > 0) {
             watched.longest.push(Duration::ZERO);
         }
+        self.watched.iter_mut().filter(|watched| watched.is_drive()).for_each(|drive| drive.targets.push(0));
     }
 
     /// Looks at all that has happened since the last call, and gives the SubDevices new inputs.
@@ -142,7 +145,7 @@ impl Judge {
         let expired = expired(device);
         it.watchdogs += u32::from(expired.wrapping_sub(std::mem::replace(&mut it.expired, expired)));
         let known = it.known;
-        for access in device.controller.logical_accesses().filter(|access| access.at > known) {
+        for access in device.controller.logical_accesses().filter(|access| access.is_valid && access.at > known) {
             it.known = access.at;
             if it.place.outputs.is_empty() {
                 if access.read {
@@ -178,10 +181,14 @@ impl Judge {
         for moved in access.moved.iter().filter(|moved| moved.write) {
             let bytes = access.data.get(moved.at..moved.at + moved.len).unwrap_or_default();
             self.checked += 1;
+            let before = it.newest.target;
             let fault = match it.place.drive {
                 Some((at, _)) => it.newest.target_fault(bytes, at),
                 None => it.newest.cycle_fault(bytes, now),
             };
+            if let Some(targets) = it.targets.last_mut() {
+                *targets += u32::from(it.newest.target != before);
+            }
             if let Some(fault) = fault {
                 self.outdated += 1;
                 self.describe(|| format!("outputs of SubDevice {position} {fault}, at {}", access.at));
@@ -235,6 +242,7 @@ impl Watched {
             expired: expired(device),
             was_enabled: false,
             longest: Vec::new(),
+            targets: Vec::new(),
             state_changes: 0,
             watchdogs: 0,
         }
@@ -243,6 +251,11 @@ impl Watched {
     /// Whether it has outputs.
     pub fn has_outputs(&self) -> bool {
         !self.place.outputs.is_empty()
+    }
+
+    /// Incidents in which a drive has taken no new target position.
+    pub fn still(&self) -> usize {
+        self.targets.iter().filter(|targets| **targets == 0).count()
     }
 
     /// Whether it is a drive.
@@ -292,6 +305,7 @@ fn expired(device: &Device) -> u8 {
 #[cfg(test)]
 mod tests {
     use ringcat::sim::cable::Host;
+    use ringcat::sim::catalogue;
 
     use super::*;
 
@@ -312,6 +326,18 @@ mod tests {
         let mut take = |target: i32| drive.target_fault(&[&[0x0F, 0][..], &target.to_le_bytes()].concat(), 2);
         assert_eq!((take(i32::MAX - 1), take(i32::MAX), take(i32::MIN)), (None, None, None), "it turns for ever");
         assert!(take(i32::MAX).is_some_and(|fault| fault.starts_with("go back from target")));
+    }
+
+    // covers: demo, standby
+    #[test]
+    fn a_drive_that_gets_no_new_target_in_an_incident_is_found() {
+        let device = Device::new(catalogue::by_name("servo").expect("it is in the catalogue"));
+        let place = Place { drive: Some((0, 0)), ..Place::default() };
+        let mut drive = Watched::new(&device, DeviceIndex(0), place);
+        drive.targets = vec![3, 1];
+        assert_eq!(drive.still(), 0);
+        drive.targets.push(0);
+        assert_eq!(drive.still(), 1);
     }
 
     // covers: demo, standby, MR-10

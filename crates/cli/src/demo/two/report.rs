@@ -202,10 +202,13 @@ fn of_subdevices(judge: &Judge) -> Vec<Check> {
     let mut checks = vec![Check { held: changes == 0 && watchdogs == 0, text }];
     let drives: Vec<&Watched> = judge.watched.iter().filter(|it| it.is_drive()).collect();
     if !drives.is_empty() {
-        let held = judge.disabled == 0 && drives.iter().all(|drive| drive.was_enabled);
-        let text = match held {
-            true => "the drives stayed enabled and went on".to_owned(),
-            false => format!("drives were not enabled, in {} cycles in all", judge.disabled),
+        let still: usize = drives.iter().map(|drive| drive.still()).sum();
+        let are_enabled = judge.disabled == 0 && drives.iter().all(|drive| drive.was_enabled);
+        let held = are_enabled && still == 0;
+        let text = match (are_enabled, still) {
+            (true, 0) => "the drives stayed enabled and got new targets in each incident".to_owned(),
+            (true, _) => format!("drives got no new target in {still} incidents"),
+            (false, _) => format!("drives were not enabled, in {} cycles in all", judge.disabled),
         };
         checks.push(Check { held, text });
     }
