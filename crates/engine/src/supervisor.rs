@@ -13,6 +13,7 @@ mod executor;
 mod flight;
 mod flights;
 mod group;
+pub(crate) mod memory_writes;
 mod outbox;
 mod posted;
 mod received;
@@ -33,6 +34,8 @@ use alloc::sync::Arc;
 use core::future::Future;
 
 use ringcat_wire::frame::MacAddress;
+#[cfg(feature = "standby")]
+use ringcat_wire::memory_write::MemoryWrite;
 
 pub(crate) use alone::Turn;
 pub use bus::Bus;
@@ -154,6 +157,12 @@ impl Supervisor {
     #[cfg(feature = "standby")]
     pub(crate) fn take_foreign(&mut self) -> Option<(Link, MacAddress)> {
         self.shared.borrow_mut().foreign.take()
+    }
+
+    /// The oldest write into the memory of a SubDevice that is under way.
+    #[cfg(feature = "standby")]
+    pub(crate) fn memory_write(&self) -> Option<MemoryWrite> {
+        self.shared.borrow().memory_writes.oldest()
     }
 
     /// Gives up overdue frames, fires expired timers, and runs procedures until all of them wait.

@@ -32,6 +32,7 @@ use ringcat_engine::time::Instant;
 pub use ringcat_engine::{Class, class_of};
 use ringcat_wire::frame::MacAddress;
 pub use ringcat_wire::master_frame::{NotReady, Stage};
+pub use ringcat_wire::memory_write::{MemoryWrite, WriteKind};
 
 pub use self::joining::{Joining, Next};
 pub use self::policy::{OnCollision, Policy};

@@ -8,6 +8,7 @@
 //! * [`sii`]: SubDevice information (EEPROM), reader and writer;
 //! * [`mailbox`]: the mailbox header, CoE, FoE, EoE, SoE, AoE, VoE, messages of a mailbox gateway;
 //! * `master_frame` (feature `standby`): what the two MainDevices of a ring send each other in each cycle;
+//! * [`memory_write`]: a write into the memory of a SubDevice that must not be cut off;
 //! * [`time`], [`address`]: newtypes.
 //!
 //! # Panic contract
@@ -29,6 +30,7 @@ pub mod frame;
 pub mod mailbox;
 #[cfg(feature = "standby")]
 pub mod master_frame;
+pub mod memory_write;
 pub mod register;
 pub mod sii;
 pub mod source_address;

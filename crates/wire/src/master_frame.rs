@@ -28,7 +28,7 @@ use crate::frame::{ETHERCAT_HEADER_LEN, ETHERNET_HEADER_LEN, ETHERTYPE};
 
 pub use answer::{Answer, NotReady, Stage};
 pub use diagnosis::{Diagnosis, DomainRecord};
-pub use fragment::{Fragment, FragmentHead, FragmentsMut, MAX_FRAGMENT, fragments_mut};
+pub use fragment::{Fragment, FragmentHead, FragmentsMut, MAX_FRAGMENT, fragments_mut, header_of_frame};
 pub use header::{Header, Lengths, Phase};
 pub use item::Item;
 pub use subdevice::SubDeviceRecord;

@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use ringcat::event_log::EventLog;
-use ringcat::standby::{Partner, StandbyEvent};
+use ringcat::standby::StandbyEvent;
 use ringcat::text::{Names, describe};
 use ringcat::{Event, Instant, SupervisorThread};
 
@@ -19,8 +19,8 @@ pub struct News {
     pub names: Arc<OnceLock<Names>>,
     /// What is counted.
     pub seen: Takeover,
-    /// Why the other MainDevice refuses the role.
-    pub refused: Option<Partner>,
+    /// Why the role was not handed over.
+    pub refused: Option<String>,
     /// How the configuration of the other MainDevice differs.
     pub difference: Option<String>,
 }
@@ -83,7 +83,10 @@ impl News {
             StandbyEvent::OtherVersion { got, least } => {
                 self.difference = Some(format!("master frames of version {got}, at least {least} was expected"));
             }
-            StandbyEvent::HandOverRefused(partner) => self.refused = Some(*partner),
+            StandbyEvent::HandOverRefused(partner) => {
+                self.refused = Some(format!("the other MainDevice refused the role: {partner}"));
+            }
+            StandbyEvent::RoleRefused(write) => self.refused = Some(format!("the role was kept: {write}")),
             _ => {}
         }
     }
@@ -113,7 +116,8 @@ mod tests {
     #[test]
     fn a_takeover_in_op_holds_and_one_through_init_or_a_difference_does_not() {
         let mut news = News::new(Instant(0));
-        let took_over = |is_hot| StandbyEvent::TookOver { silence: Some(Duration::ZERO), in_state: 3, is_hot };
+        let took_over =
+            |is_hot| StandbyEvent::TookOver { silence: Some(Duration::ZERO), in_state: 3, is_hot, cut: None };
         news.count(&took_over(true));
         assert_eq!((news.seen.takeovers, news.reasons().len()), (1, 0));
         news.count(&took_over(false));

@@ -194,10 +194,8 @@ impl Controller<'_> {
             self.news.report(&self.supervisor, now());
             return None;
         }
-        Some(self.news.refused.map_or_else(
-            || "the other MainDevice did not take the role".to_owned(),
-            |partner| format!("the other MainDevice refused the role: {partner}"),
-        ))
+        let refused = self.news.refused.take();
+        Some(refused.unwrap_or_else(|| "the other MainDevice did not take the role".to_owned()))
     }
 
     /// Ends the cycles in order.

@@ -3,10 +3,11 @@
 //! The acyclic half of the ACTIVE posts its knowledge of the segment, which the cyclic half sends piece by piece; the
 //! cyclic half of the INACTIVE posts what it has heard.
 
-use core::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, AtomicU64, Ordering};
 
 use ringcat_wire::frame::MacAddress;
 use ringcat_wire::master_frame::{Diagnosis, DomainRecord};
+use ringcat_wire::memory_write::MemoryWrite;
 
 use super::sheet::Sheet;
 use crate::link::Link;
@@ -50,6 +51,8 @@ pub struct StandbyWords {
     /// Source address and link of an acyclic frame of another MainDevice that came while this one was ACTIVE; 0 without
     /// one. Writer: the acyclic half; the cyclic half takes it.
     collision: AtomicU64,
+    /// A write into the memory of a SubDevice that is under way; 0 without one. Writer: the acyclic half.
+    write: AtomicU16,
 }
 
 /// Bits of the word of a collision beside the address: there is one, and it came on the redundant link.
@@ -68,6 +71,7 @@ impl Default for StandbyWords {
             heard_at: AtomicU64::new(0),
             other_version: AtomicU32::new(0),
             collision: AtomicU64::new(0),
+            write: AtomicU16::new(0),
         }
     }
 }
@@ -119,6 +123,16 @@ impl StandbyWords {
         let [_, _, a, b, c, d, e, f] = word.to_be_bytes();
         let link = if word & ON_REDUNDANT == 0 { Link::Main } else { Link::Redundant };
         Some((link, MacAddress([a, b, c, d, e, f])))
+    }
+
+    /// Posts the write into the memory of a SubDevice that is under way here.
+    pub fn post_write(&self, write: Option<MemoryWrite>) {
+        self.write.store(write.map_or(0, MemoryWrite::code), Ordering::Relaxed);
+    }
+
+    /// That write.
+    pub fn write(&self) -> Option<MemoryWrite> {
+        MemoryWrite::from_code(self.write.load(Ordering::Relaxed))
     }
 
     /// Posts that the other MainDevice has a version that cannot be read.

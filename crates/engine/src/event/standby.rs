@@ -6,6 +6,7 @@ use core::time::Duration;
 
 use ringcat_wire::frame::MacAddress;
 use ringcat_wire::master_frame::{NotReady, Stage};
+use ringcat_wire::memory_write::MemoryWrite;
 
 use crate::link::Link;
 use crate::queue::WORDS;
@@ -31,6 +32,8 @@ pub enum StandbyEvent {
         in_state: u16,
         /// They keep their configuration; otherwise all are configured again from INIT on.
         is_hot: bool,
+        /// A write into the memory of a SubDevice by the other MainDevice, which the takeover may have cut off.
+        cut: Option<MemoryWrite>,
     },
     /// What this MainDevice, as ACTIVE, knows of the other one has changed.
     Partner(Partner),
@@ -57,6 +60,9 @@ pub enum StandbyEvent {
     },
     /// The role was to be handed over, and the other MainDevice does not take it.
     HandOverRefused(Partner),
+    /// A requested change of the role was refused: this write into the memory of a SubDevice is under way, and the
+    /// change would cut it off ([`RoleControl::force`](crate::role::RoleControl::force)).
+    RoleRefused(MemoryWrite),
 }
 
 const KIND_ROLE: u64 = 0x10;
@@ -67,6 +73,7 @@ const KIND_ITEM: u64 = 0x14;
 const KIND_COUNT: u64 = 0x15;
 const KIND_VERSION: u64 = 0x16;
 const KIND_REFUSED: u64 = 0x17;
+const KIND_KEPT: u64 = 0x18;
 
 /// An event of the exchange, which is packed into words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,6 +88,8 @@ pub enum CyclicStandbyEvent {
         in_state: u16,
         /// They keep their configuration.
         is_hot: bool,
+        /// A write that may have been cut off.
+        cut: Option<MemoryWrite>,
     },
     /// See [`StandbyEvent::Partner`].
     Partner(Partner),
@@ -109,6 +118,8 @@ pub enum CyclicStandbyEvent {
     },
     /// See [`StandbyEvent::HandOverRefused`].
     HandOverRefused(Partner),
+    /// See [`StandbyEvent::RoleRefused`].
+    RoleRefused(MemoryWrite),
 }
 
 impl CyclicStandbyEvent {
@@ -124,12 +135,16 @@ impl CyclicStandbyEvent {
                 };
                 [KIND_ROLE | role << 8 | cause << 16, 0, 0]
             }
-            CyclicStandbyEvent::TookOver { silence, in_state, is_hot } => {
+            CyclicStandbyEvent::TookOver { silence, in_state, is_hot, cut } => {
+                let cut = match cut {
+                    Some(write) => write.code() as u64,
+                    None => 0,
+                };
                 let silence = match silence {
                     Some(silence) => silence.as_nanos() as u64 | 1 << 63,
                     None => 0,
                 };
-                [KIND_TOOK_OVER | (is_hot as u64) << 8 | (in_state as u64) << 16, silence, 0]
+                [KIND_TOOK_OVER | (is_hot as u64) << 8 | (in_state as u64) << 16, silence, cut]
             }
             CyclicStandbyEvent::Partner(partner) => [KIND_PARTNER, partner_word(partner), 0],
             CyclicStandbyEvent::Collision { arrived_on, source: MacAddress([a, b, c, d, e, f]) } => {
@@ -144,6 +159,7 @@ impl CyclicStandbyEvent {
                 [KIND_VERSION | (got as u64) << 8 | (least as u64) << 16, 0, 0]
             }
             CyclicStandbyEvent::HandOverRefused(partner) => [KIND_REFUSED, partner_word(partner), 0],
+            CyclicStandbyEvent::RoleRefused(write) => [KIND_KEPT | (write.code() as u64) << 16, 0, 0],
         }
     }
 
@@ -164,7 +180,8 @@ impl CyclicStandbyEvent {
             KIND_TOOK_OVER => {
                 let silence = Duration::from_nanos(words[1] & !(1 << 63));
                 let silence = if words[1] >> 63 != 0 { Some(silence) } else { None };
-                Some(CyclicStandbyEvent::TookOver { silence, in_state: half, is_hot: bytes[1] != 0 })
+                let cut = MemoryWrite::from_code(words[2] as u16);
+                Some(CyclicStandbyEvent::TookOver { silence, in_state: half, is_hot: bytes[1] != 0, cut })
             }
             KIND_PARTNER => Some(CyclicStandbyEvent::Partner(partner_of(words[1]))),
             KIND_COLLISION => {
@@ -176,6 +193,10 @@ impl CyclicStandbyEvent {
             KIND_COUNT => Some(CyclicStandbyEvent::Count { here: half, there: (words[0] >> 32) as u16 }),
             KIND_VERSION => Some(CyclicStandbyEvent::OtherVersion { got: bytes[1], least: bytes[2] }),
             KIND_REFUSED => Some(CyclicStandbyEvent::HandOverRefused(partner_of(words[1]))),
+            KIND_KEPT => match MemoryWrite::from_code(half) {
+                Some(write) => Some(CyclicStandbyEvent::RoleRefused(write)),
+                None => None,
+            },
             _ => None,
         }
     }
@@ -184,8 +205,8 @@ impl CyclicStandbyEvent {
     pub fn event(self, name_of: impl FnOnce(u16) -> String) -> StandbyEvent {
         match self {
             CyclicStandbyEvent::RoleChanged(role, cause) => StandbyEvent::RoleChanged { role, cause },
-            CyclicStandbyEvent::TookOver { silence, in_state, is_hot } => {
-                StandbyEvent::TookOver { silence, in_state, is_hot }
+            CyclicStandbyEvent::TookOver { silence, in_state, is_hot, cut } => {
+                StandbyEvent::TookOver { silence, in_state, is_hot, cut }
             }
             CyclicStandbyEvent::Partner(partner) => StandbyEvent::Partner(partner),
             CyclicStandbyEvent::Collision { arrived_on, source } => StandbyEvent::Collision { arrived_on, source },
@@ -198,6 +219,7 @@ impl CyclicStandbyEvent {
             },
             CyclicStandbyEvent::OtherVersion { got, least } => StandbyEvent::OtherVersion { got, least },
             CyclicStandbyEvent::HandOverRefused(partner) => StandbyEvent::HandOverRefused(partner),
+            CyclicStandbyEvent::RoleRefused(write) => StandbyEvent::RoleRefused(write),
         }
     }
 }
@@ -227,6 +249,8 @@ const fn partner_of(word: u64) -> Partner {
 
 #[cfg(test)]
 mod tests {
+    use ringcat_wire::memory_write::WriteKind;
+
     use super::*;
     use crate::event::CyclicEvent;
 
@@ -235,11 +259,17 @@ mod tests {
     fn events_of_the_standby_survive_the_words() {
         let alive = Partner::Alive { stage: Stage::Ready, not_ready: NotReady(0x41), is_consistent: true };
         let source = MacAddress([1, 2, 3, 4, 5, 6]);
+        let write = MemoryWrite::new(WriteKind::Boot, true, 0x123);
         let events = [
             CyclicStandbyEvent::RoleChanged(MainDeviceRole::Inactive, RoleCause::LinksLost),
             CyclicStandbyEvent::RoleChanged(MainDeviceRole::Active, RoleCause::HandedOver),
-            CyclicStandbyEvent::TookOver { silence: Some(Duration::from_nanos(7)), in_state: 33, is_hot: true },
-            CyclicStandbyEvent::TookOver { silence: None, in_state: 0, is_hot: false },
+            CyclicStandbyEvent::TookOver {
+                silence: Some(Duration::from_nanos(7)),
+                in_state: 33,
+                is_hot: true,
+                cut: Some(write),
+            },
+            CyclicStandbyEvent::TookOver { silence: None, in_state: 0, is_hot: false, cut: None },
             CyclicStandbyEvent::Partner(alive),
             CyclicStandbyEvent::Partner(Partner::Forwards),
             CyclicStandbyEvent::Collision { arrived_on: Link::Redundant, source },
@@ -247,6 +277,7 @@ mod tests {
             CyclicStandbyEvent::Count { here: 33, there: 0xFFFF },
             CyclicStandbyEvent::OtherVersion { got: 3, least: 2 },
             CyclicStandbyEvent::HandOverRefused(Partner::Absent),
+            CyclicStandbyEvent::RoleRefused(write),
         ];
         for event in events {
             assert_eq!(CyclicEvent::unpack(event.pack()), Some(CyclicEvent::Standby(event)));

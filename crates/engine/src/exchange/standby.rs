@@ -16,6 +16,7 @@ use alloc::boxed::Box;
 
 use ringcat_wire::frame::MacAddress;
 use ringcat_wire::master_frame::{Header, NotReady};
+use ringcat_wire::memory_write::MemoryWrite;
 
 use super::Exchange;
 use super::following::{Following, OutputsSeen};
@@ -62,6 +63,7 @@ impl Exchange {
             foreign_in: 0,
             acyclic_counts_from: 0,
             collided_with: None,
+            collided_write: None,
             other_version: None,
             noticed: None,
             begun_at: Instant::NEVER,
@@ -88,6 +90,16 @@ impl Exchange {
     /// ACTIVE. Bytes 3 to 5 are those of its main interface.
     pub fn take_collision(&mut self) -> Option<MacAddress> {
         self.standby.0.as_deref_mut()?.collided_with.take()
+    }
+
+    /// A write into the memory of a SubDevice that the own acyclic half does.
+    pub fn memory_write(&self) -> Option<MemoryWrite> {
+        self.standby.0.as_ref()?.words.write()
+    }
+
+    /// The same of the other ACTIVE in a collision, as its last master frame says.
+    pub fn memory_write_of_collided(&self) -> Option<MemoryWrite> {
+        self.standby.0.as_ref()?.collided_write
     }
 
     /// Whether a link has a carrier, as the acyclic half knows it; `None` if the links do not report it.

@@ -4,6 +4,7 @@ use alloc::rc::Rc;
 use core::time::Duration;
 
 use ringcat_wire::address::{RegisterAddress, StationAddress};
+use ringcat_wire::memory_write::WriteKind;
 use ringcat_wire::sii::MailboxLayout;
 
 use super::conversation::Conversation;
@@ -16,6 +17,7 @@ use super::unsolicited::{Unclaimed, Unsolicited};
 use crate::declared::Address;
 use crate::role::Function;
 use crate::supervisor::Bus;
+use crate::supervisor::memory_writes::UnderWayWrite;
 
 /// The handle to a SubDevice's mailbox and its router; copies are handles to the same mailbox. It stays valid while the
 /// SubDevice is absent: while the mailbox is not in use, every request ends with [`MailboxError::Closed`].
@@ -94,6 +96,11 @@ impl Mailbox {
     pub(crate) fn send_status(&self) -> Option<(StationAddress, RegisterAddress)> {
         let state = self.shared.state();
         state.session.filter(|_| state.open).map(|session| (session.station, session.send_status()))
+    }
+
+    /// Notes that a write into the memory of the SubDevice is under way, until what is returned is dropped.
+    pub(super) fn begin_memory_write(&self, kind: WriteKind) -> UnderWayWrite {
+        self.shared.bus.begin_memory_write(kind, self.shared.subdevice.get())
     }
 
     /// Waits until a lane is free, and takes it.

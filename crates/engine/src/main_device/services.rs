@@ -7,6 +7,7 @@ use core::future::Future;
 use core::time::Duration;
 
 use ringcat_wire::address::{RegisterAddress, StationAddress};
+use ringcat_wire::memory_write::WriteKind;
 use ringcat_wire::register::LoopControl;
 
 use super::MainDevice;
@@ -217,8 +218,10 @@ impl MainDevice {
         force: bool,
     ) -> Pending<Result<SiiWritten, ServiceError>> {
         let (cache, eeproms) = (self.cache.clone(), self.segment.eeproms.clone());
+        let subdevice: Address = subdevice.into();
         self.start_on(Function::Eeprom, subdevice, move |bus, station| async move {
             let _turn = eeproms.take(station).await;
+            let _write = bus.begin_memory_write(WriteKind::Eeprom, subdevice);
             let written = program::write(&bus, station, &image, force).await;
             cache.clear();
             written
@@ -234,8 +237,10 @@ impl MainDevice {
         force: bool,
     ) -> Pending<Result<SiiWritten, ServiceError>> {
         let (cache, eeproms) = (self.cache.clone(), self.segment.eeproms.clone());
+        let subdevice: Address = subdevice.into();
         self.start_on(Function::Eeprom, subdevice, move |bus, station| async move {
             let _turn = eeproms.take(station).await;
+            let _write = bus.begin_memory_write(WriteKind::Eeprom, subdevice);
             let written = program::write_alias(&bus, station, alias, force).await;
             cache.clear();
             written

@@ -3,6 +3,7 @@
 use alloc::sync::Arc;
 
 use ringcat_wire::frame::MacAddress;
+use ringcat_wire::memory_write::MemoryWrite;
 
 use super::identity::Configuration;
 use super::listener::Listener;
@@ -26,6 +27,9 @@ pub(super) struct Standby {
     pub other_version: Option<u8>,
     /// The last collision while there was no application.
     pub collision: Option<Collision>,
+    /// A SubDevice in BOOT, and when it is looked for next.
+    pub in_boot: Option<MemoryWrite>,
+    pub boot_at: Instant,
     /// When the knowledge is made next, at the earliest and if nothing has changed.
     pub publish_at: (Instant, Instant),
     /// What the published knowledge was made from.
@@ -63,6 +67,8 @@ impl Standby {
             session: None,
             other_version: None,
             collision: None,
+            in_boot: None,
+            boot_at: Instant(0),
             publish_at: (Instant(0), Instant(0)),
             published: None,
         }

@@ -8,6 +8,7 @@ use core::time::Duration;
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::frame::MacAddress;
+use ringcat_wire::memory_write::{MemoryWrite, WriteKind};
 
 use super::MainDevice;
 use super::standby::Collision;
@@ -23,11 +24,14 @@ use crate::procedures::shared_segment::Beside;
 use crate::role::{MainDeviceRole, Partner, RoleCause, RoleRequest};
 use crate::segment::clocks::ClockObservation;
 use crate::segment::setup::Setup;
-use crate::segment::{Observation, StandbyObservation};
+use crate::segment::unassigned::UnassignedView;
+use crate::segment::{Observation, Segment, StandbyObservation};
 use crate::time::Instant;
 
 /// After this time without frames of another ACTIVE, the next one is a new collision.
 const COLLISIONS_APART: Duration = Duration::from_millis(100);
+/// Interval at which it is looked for SubDevices in BOOT.
+const BOOT_EACH: Duration = Duration::from_millis(10);
 
 impl MainDevice {
     /// Follows a change of the role, and publishes what the other MainDevice needs. Without an application, requested
@@ -50,21 +54,40 @@ impl MainDevice {
             }
             self.supervisor.poll(now);
         }
+        self.post_memory_write(now);
         self.publish_knowledge(now);
+    }
+
+    /// Posts a write into the memory of a SubDevice that is under way: the role is not given up meanwhile.
+    fn post_memory_write(&mut self, now: Instant) {
+        let write = self.supervisor.memory_write();
+        let Some(standby) = &mut self.standby else { return };
+        if now >= standby.boot_at {
+            standby.boot_at = now + BOOT_EACH;
+            standby.in_boot = in_boot(&self.segment.view());
+        }
+        standby.words.post_write(write.or(standby.in_boot));
     }
 
     /// A requested role takes effect: there is no application whose cycles could take it.
     fn take_request(&mut self, now: Instant) {
-        let role = match self.roles.take_request() {
-            Some(RoleRequest::Active) => MainDeviceRole::Active,
-            Some(RoleRequest::Inactive) => MainDeviceRole::Inactive,
-            Some(RoleRequest::HandOver) => {
+        let Some((request, is_forced)) = self.roles.take_request() else { return };
+        let role = match request {
+            RoleRequest::Active => MainDeviceRole::Active,
+            RoleRequest::Inactive => MainDeviceRole::Inactive,
+            RoleRequest::HandOver => {
                 let event = Event::Standby(StandbyEvent::HandOverRefused(Partner::Absent));
                 return self.supervisor.append_event(now, event, 0);
             }
-            None => return,
         };
-        if role != self.role() {
+        if role == self.role() {
+            return;
+        }
+        let write = self.supervisor.memory_write().filter(|_| role == MainDeviceRole::Inactive && !is_forced);
+        if let Some(write) = write {
+            let event = Event::Standby(StandbyEvent::RoleRefused(write));
+            self.supervisor.append_event(now, event, 0);
+        } else {
             self.set_role(role);
             let event = StandbyEvent::RoleChanged { role, cause: RoleCause::Requested };
             self.supervisor.append_event(now, Event::Standby(event), 0);
@@ -186,4 +209,15 @@ fn in_use(station: ringcat_wire::address::StationAddress, setup: &Setup) -> Opti
     let layout = setup.plan.mailbox_layout()?;
     let [_, send] = &setup.plan.mailbox[..] else { return None };
     Some(InUse { station, layout, send_manager: send.index, is_full: true })
+}
+
+/// A SubDevice that is in BOOT, or is to be.
+fn in_boot(view: &Segment) -> Option<MemoryWrite> {
+    let boot = |is_position, number| Some(MemoryWrite::new(WriteKind::Boot, is_position, number));
+    if let Some(index) = view.members().position(|member| member.target == AlState::Boot) {
+        return boot(false, index);
+    }
+    let in_boot = |it: &UnassignedView<'_>| it.upkeep.as_ref().is_some_and(|upkeep| upkeep.target == AlState::Boot);
+    let undeclared = view.subdevices().unassigned().find(in_boot)?;
+    boot(true, undeclared.knowledge.info().map_or(usize::MAX, |info| usize::from(info.position.0)))
 }

@@ -63,6 +63,9 @@ impl fmt::Display for RoleCause {
     }
 }
 
+/// Bit of a request: it takes effect also while a write into the memory of a SubDevice is under way.
+const FORCED: u8 = 0x80;
+
 #[derive(Debug)]
 struct Words {
     /// 0 is ACTIVE, 1 is INACTIVE.
@@ -113,13 +116,22 @@ impl RoleControl {
     }
 
     /// Requests a role from the next cycle on. It replaces a request that has not taken effect.
+    ///
+    /// While a file is written to a SubDevice (FoE), an EEPROM is written, or a SubDevice is in BOOT, a request that
+    /// would take the bus away from the MainDevice that writes is refused and reported as an event.
     pub fn request(&self, request: RoleRequest) {
         self.words.request.store(request.code(), Ordering::Release);
     }
 
+    /// Requests a role from the next cycle on, also if that cuts off a write into the memory of a SubDevice: it may be
+    /// destroyed.
+    pub fn force(&self, request: RoleRequest) {
+        self.words.request.store(request.code() | FORCED, Ordering::Release);
+    }
+
     /// The request that has not taken effect yet.
     pub fn requested(&self) -> Option<RoleRequest> {
-        RoleRequest::from_code(self.words.request.load(Ordering::Acquire))
+        RoleRequest::from_code(self.words.request.load(Ordering::Acquire) & !FORCED)
     }
 
     /// Whether there is a request. Cheap.
@@ -129,10 +141,11 @@ impl RoleControl {
         self.words.request.load(Ordering::Relaxed) != 0
     }
 
-    /// Takes the request: the cycle in which it takes effect begins.
+    /// Takes the request, and whether it is forced: the cycle in which it takes effect begins.
     #[cfg(any(test, feature = "standby"))]
-    pub(crate) fn take_request(&self) -> Option<RoleRequest> {
-        RoleRequest::from_code(self.words.request.swap(0, Ordering::AcqRel))
+    pub(crate) fn take_request(&self) -> Option<(RoleRequest, bool)> {
+        let code = self.words.request.swap(0, Ordering::AcqRel);
+        Some((RoleRequest::from_code(code & !FORCED)?, code & FORCED != 0))
     }
 
     /// Sets the role; false if it is that already. For the half that runs the cycles.
@@ -180,7 +193,10 @@ mod tests {
         handle.request(RoleRequest::HandOver);
         handle.request(RoleRequest::Inactive);
         assert_eq!(control.role(), MainDeviceRole::Inactive, "before the next cycle");
-        assert_eq!(control.take_request(), Some(RoleRequest::Inactive));
+        assert_eq!(control.take_request(), Some((RoleRequest::Inactive, false)));
+        handle.force(RoleRequest::HandOver);
+        assert_eq!(control.requested(), Some(RoleRequest::HandOver));
+        assert_eq!(control.take_request(), Some((RoleRequest::HandOver, true)));
         assert_eq!((control.take_request(), control.requested()), (None, None));
         assert!(!control.set(MainDeviceRole::Inactive) && control.changes() == 0);
         assert!(control.set(MainDeviceRole::Active) && handle.changes() == 1);

@@ -11,6 +11,7 @@ use super::command_reports::{CommandReports, WrongCommand};
 use super::counters::AcyclicCounters;
 use super::debug_message::DebugMessages;
 use super::flights::Flights;
+use super::memory_writes::MemoryWrites;
 use super::outbox::{Outbox, Rank};
 use super::posted::Watchers;
 use super::reply::BusError;
@@ -61,6 +62,7 @@ pub(crate) struct Shared {
     /// Largest number of datagrams in a frame.
     pub(crate) max_datagrams: usize,
     pub(crate) role: RoleControl,
+    pub(crate) memory_writes: MemoryWrites,
     pub(crate) current: TaskId,
     pub(crate) spawned: VecDeque<Task>,
     ready: VecDeque<TaskId>,
@@ -104,6 +106,7 @@ impl Shared {
             bell: Bell::default(),
             max_datagrams: usize::MAX,
             role: RoleControl::default(),
+            memory_writes: MemoryWrites::default(),
             current: TaskId(0),
             spawned: VecDeque::new(),
             ready: VecDeque::new(),

@@ -101,6 +101,8 @@ impl Cyclic {
             heard_at: of_two.heard_at,
             heard_any_at: exchange.heard_any_at(),
             collided_with: exchange.take_collision(),
+            writes: exchange.memory_write().is_some(),
+            other_writes: exchange.memory_write_of_collided().is_some(),
         };
         if let Some(request) = watch.decide(&situation, now)
             && let Some(control) = exchange.role_control()

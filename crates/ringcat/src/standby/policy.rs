@@ -20,10 +20,12 @@ const LEAST_CYCLES: u32 = 3;
 #[non_exhaustive]
 pub enum OnCollision {
     /// The one with the lower bytes 3 to 5 in the address of its main interface stays ACTIVE, the other one becomes
-    /// INACTIVE with its next cycle. No cycle is lost if both have this policy.
+    /// INACTIVE with its next cycle. No cycle is lost if both have this policy. Exception: one that writes a file or an
+    /// EEPROM, or has a SubDevice in BOOT, stays. If both do, both stay until one of the writes has ended.
     #[default]
     LowerAddressStays,
-    /// It becomes INACTIVE. If both do, one of them takes over after its time-out and a random pause.
+    /// It becomes INACTIVE, but not while it writes as above. If both do, one of them takes over after its time-out and
+    /// a random pause.
     Yield,
     /// Nothing: the application decides, which gets [`StandbyEvent::Collision`](super::StandbyEvent::Collision).
     Stay,
@@ -122,6 +124,10 @@ pub(crate) struct Situation {
     pub heard_any_at: Option<Instant>,
     /// The other one, of which a frame came while this one is ACTIVE.
     pub collided_with: Option<MacAddress>,
+    /// Whether this one writes into the memory of a SubDevice.
+    pub writes: bool,
+    /// Whether the other one does.
+    pub other_writes: bool,
 }
 
 /// A policy, as it is followed.
@@ -148,7 +154,8 @@ impl Watch {
         match situation.role {
             MainDeviceRole::Active => {
                 let other = situation.collided_with?;
-                self.yields_to(other).then_some(RoleRequest::Inactive)
+                let yields = !situation.writes && self.yields_to(other, situation.other_writes);
+                yields.then_some(RoleRequest::Inactive)
             }
             _ => {
                 let limit = match situation.heard_at {
@@ -164,9 +171,9 @@ impl Watch {
         }
     }
 
-    fn yields_to(&self, other: MacAddress) -> bool {
+    fn yields_to(&self, other: MacAddress, writes: bool) -> bool {
         match self.policy.on_collision {
-            OnCollision::LowerAddressStays => is_lower(other, self.own),
+            OnCollision::LowerAddressStays => writes || is_lower(other, self.own),
             OnCollision::Yield => true,
             OnCollision::Stay => false,
         }
@@ -223,6 +230,8 @@ mod tests {
             heard_at,
             heard_any_at: None,
             collided_with: None,
+            writes: false,
+            other_writes: false,
         }
     }
 
@@ -281,5 +290,25 @@ mod tests {
         assert_eq!(decide(policy.with_on_collision(OnCollision::Stay), 0x10), None);
         let alone = Situation { collided_with: None, ..collided(0) };
         assert_eq!(watch(policy).decide(&alone, Instant(MS)), None);
+    }
+
+    // covers: standby, MR-10, seed 000 3.7
+    #[test]
+    fn of_two_active_the_one_that_writes_into_a_memory_stays() {
+        let decide = |policy: Policy, last, writes, other_writes| {
+            watch(policy).decide(&Situation { writes, other_writes, ..collided(last) }, Instant(MS))
+        };
+        let policy = Policy::default();
+        let yields = Policy::default().with_on_collision(OnCollision::Yield);
+        for (last, writes, other_writes, expected) in [
+            (0x10, true, false, None),
+            (0x10, true, true, None),
+            (0x12, true, true, None),
+            (0x12, false, true, Some(RoleRequest::Inactive)),
+            (0x12, false, false, None),
+        ] {
+            assert_eq!(decide(policy, last, writes, other_writes), expected, "{last:#x}, {writes}, {other_writes}");
+        }
+        assert_eq!(decide(yields, 0x12, true, false), None);
     }
 }

@@ -12,14 +12,15 @@ pub(super) fn describe(event: &Event) -> Option<String> {
             format!("ACTIVE ({cause}): this MainDevice controls the bus")
         }
         StandbyEvent::RoleChanged { role, cause } => format!("{role} ({cause}): this MainDevice sends nothing"),
-        StandbyEvent::TookOver { silence, in_state, is_hot } => {
+        StandbyEvent::TookOver { silence, in_state, is_hot, cut } => {
             let silence = silence.map_or_else(
                 || "no frame of another MainDevice has come".to_owned(),
                 |time| format!("the last cycle of the other MainDevice was {:.3} ms ago", time.as_secs_f64() * 1e3),
             );
+            let cut = cut.map_or_else(String::new, |write| format!("; was cut off, perhaps: {write}"));
             match is_hot {
-                true => format!("taken over: {in_state} SubDevices go on as they are; {silence}"),
-                false => format!("taken over: all SubDevices are configured again from INIT on; {silence}"),
+                true => format!("taken over: {in_state} SubDevices go on as they are; {silence}{cut}"),
+                false => format!("taken over: all SubDevices are configured again from INIT on; {silence}{cut}"),
             }
         }
         StandbyEvent::Partner(partner) => format!("the other MainDevice: {partner}"),
@@ -34,6 +35,9 @@ pub(super) fn describe(event: &Event) -> Option<String> {
         ),
         StandbyEvent::HandOverRefused(partner) => {
             format!("the role was not handed over: the other MainDevice is {partner}")
+        }
+        StandbyEvent::RoleRefused(write) => {
+            format!("the role does not change: {write}; a forced request would cut that off")
         }
         _ => return None,
     })

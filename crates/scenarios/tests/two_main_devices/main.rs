@@ -6,6 +6,7 @@ mod clocks;
 mod collisions;
 mod following;
 mod library;
+mod memory_writes;
 mod outside_links;
 mod random_runs;
 mod rows;
@@ -40,9 +41,14 @@ const KINDS: [&str; 8] = [
 
 /// A ring through both; the line begins at the main link of `near`.
 fn ring_of_two(count: usize, near: Host) -> Network {
-    let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10));
     let kinds: Vec<&str> = KINDS.into_iter().cycle().take(count).collect();
-    SegmentBuilder::ring_of_two(devices(descriptions(&kinds)), near).options(options).build().expect("the cables fit")
+    ring_of(&kinds, near)
+}
+
+/// The same with SubDevices of these kinds.
+fn ring_of(kinds: &[&str], near: Host) -> Network {
+    let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10));
+    SegmentBuilder::ring_of_two(devices(descriptions(kinds)), near).options(options).build().expect("the cables fit")
 }
 
 fn declare(scan: &Scan) -> Declaration {

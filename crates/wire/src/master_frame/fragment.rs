@@ -1,5 +1,6 @@
 //! Fragments of areas: their heads, and the walk over those of a received frame.
 
+use super::header::Header as CycleHeader;
 use super::{ADDRESS, Area, is_master_frame};
 use crate::command::Command;
 use crate::datagram::{self, HEADER_LEN, Header, MAX_DATA, WKC_LEN};
@@ -85,6 +86,20 @@ pub fn fragments_mut(frame: &mut [u8]) -> FragmentsMut<'_> {
     let rest = frame.get_mut(ETHERNET_HEADER_LEN + ETHERCAT_HEADER_LEN..).unwrap_or_default();
     let length = (announced & 0x07FF).min(rest.len());
     FragmentsMut { rest: rest.get_mut(..length).unwrap_or_default() }
+}
+
+/// The header of a cycle in a received frame, if that is the first master frame of a cycle: its first datagram has it.
+/// Any bytes are allowed.
+pub fn header_of_frame(frame: &[u8]) -> Option<CycleHeader> {
+    if !is_master_frame(frame) {
+        return None;
+    }
+    let rest = frame.get(ETHERNET_HEADER_LEN + ETHERCAT_HEADER_LEN..)?;
+    let header = Header::decode(rest.first_chunk()?);
+    let content = rest.get(HEADER_LEN..HEADER_LEN + usize::from(header.length))?;
+    let (head, data) = content.split_first_chunk()?;
+    let head = FragmentHead::decode(head);
+    if head.area == Area::Header && head.offset == 0 { CycleHeader::decode(data).ok() } else { None }
 }
 
 impl<'a> Iterator for FragmentsMut<'a> {

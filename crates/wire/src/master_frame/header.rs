@@ -3,6 +3,7 @@
 use super::cursor::{Reader, Writer};
 use super::item::Item;
 use super::{LEAST_READER, MAGIC, MasterFrameError, VERSION};
+use crate::memory_write::MemoryWrite;
 
 /// What follows this cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -77,6 +78,8 @@ pub struct Header {
     pub session: u16,
     /// Version of the knowledge that is sent piece by piece; another one with each change.
     pub knowledge: u16,
+    /// A write into the memory of a SubDevice that is under way.
+    pub write: Option<MemoryWrite>,
     /// Bytes of that knowledge; 0 if none is sent.
     pub knowledge_len: u32,
     /// Period of the cycles in nanoseconds.
@@ -115,7 +118,7 @@ impl Header {
         let (phase, state) = (Phase::from_code(from.u8()), from.u8());
         let (fragments, first, frames) = (from.u16(), from.u16(), from.u16());
         let (session, knowledge) = (from.u16(), from.u16());
-        let _reserved = from.u16();
+        let write = MemoryWrite::from_code(from.u16());
         let (knowledge_len, period_ns, identity) = (from.u32(), from.u32(), from.u64());
         let item = Item::take(&mut from);
         let lengths = Lengths {
@@ -135,6 +138,7 @@ impl Header {
             frames,
             session,
             knowledge,
+            write,
             knowledge_len,
             period_ns,
             identity,
@@ -148,7 +152,8 @@ impl Header {
         let mut out = Writer::new(out, Self::LEN)?;
         out.put(&MAGIC);
         [self.version, self.least, self.phase.code(), self.state].into_iter().for_each(|byte| out.u8(byte));
-        let words = [self.fragments, self.first, self.frames, self.session, self.knowledge, 0];
+        let write = self.write.map_or(0, MemoryWrite::code);
+        let words = [self.fragments, self.first, self.frames, self.session, self.knowledge, write];
         words.into_iter().for_each(|word| out.u16(word));
         out.u32(self.knowledge_len);
         out.u32(self.period_ns);

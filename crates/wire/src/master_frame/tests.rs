@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::datagram::Target;
 use crate::frame::{FrameBuilder, MAX_FRAME, MacAddress};
+use crate::memory_write::{MemoryWrite, WriteKind};
 
 /// The header of the golden bytes.
 fn header() -> Header {
@@ -18,6 +19,7 @@ fn header() -> Header {
         frames: 2,
         session: 5,
         knowledge: 3,
+        write: Some(MemoryWrite::new(WriteKind::Eeprom, false, 0x102)),
         knowledge_len: 0x0001_0203,
         period_ns: 1_000_000,
         identity: 0x0102_0304_0506_0708,
@@ -28,9 +30,9 @@ fn header() -> Header {
 }
 
 const HEADER_BYTES: [u8; 64] = [
-    b'R', b'C', b'm', b'r', 1, 1, 1, 8, 7, 0, 0x34, 0x12, 2, 0, 5, 0, 3, 0, 0, 0, 3, 2, 1, 0, 0x40, 0x42, 0x0F, 0, 8,
-    7, 6, 5, 4, 3, 2, 1, 9, 0, 33, 0, 0xDD, 0xCC, 0xBB, 0xAA, 33, 0, 0, 0, 0x30, 0x14, 0, 0, 57, 0, 0, 0, 44, 0, 0, 0,
-    13, 0, 0, 0,
+    b'R', b'C', b'm', b'r', 1, 1, 1, 8, 7, 0, 0x34, 0x12, 2, 0, 5, 0, 3, 0, 2, 0x81, 3, 2, 1, 0, 0x40, 0x42, 0x0F, 0,
+    8, 7, 6, 5, 4, 3, 2, 1, 9, 0, 33, 0, 0xDD, 0xCC, 0xBB, 0xAA, 33, 0, 0, 0, 0x30, 0x14, 0, 0, 57, 0, 0, 0, 44, 0, 0,
+    0, 13, 0, 0, 0,
 ];
 
 // covers: 9.8, FR-03, standby
@@ -44,6 +46,25 @@ fn a_header_of_a_cycle_has_the_expected_bytes() {
     let short = MasterFrameError::Short { what: "header of a master frame", expected: 64, got: 63 };
     assert_eq!(Header::decode(&HEADER_BYTES[..63]), Err(short));
     assert_eq!(short.to_string(), "header of a master frame too short: expected at least 64 bytes, got 63");
+}
+
+// covers: 9.8, FR-03, standby
+#[test]
+fn the_header_is_read_from_the_first_master_frame_of_a_cycle_only() {
+    let frame_of = |area: Area, offset: u32, content: &[u8]| {
+        let mut bytes = frame(&[(FragmentHead { offset, ..head(area, 0) }, content.len())]);
+        let at = bytes.len() - 2 - content.len();
+        bytes[at..at + content.len()].copy_from_slice(content);
+        bytes
+    };
+    let whole = frame_of(Area::Header, 0, &HEADER_BYTES);
+    assert_eq!(header_of_frame(&whole), Some(header()));
+    assert_eq!(header_of_frame(&frame_of(Area::Diagnosis, 0, &HEADER_BYTES)), None);
+    assert_eq!(header_of_frame(&frame_of(Area::Header, 4, &HEADER_BYTES)), None);
+    assert_eq!(header_of_frame(&frame_of(Area::Header, 0, &HEADER_BYTES[..63])), None);
+    for length in 0..whole.len() {
+        let _ = header_of_frame(&whole[..length]);
+    }
 }
 
 // covers: 9.8, FR-04, standby

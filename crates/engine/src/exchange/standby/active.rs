@@ -1,7 +1,7 @@
 //! The exchange of the ACTIVE: master frames out and back, and frames of others.
 
 use ringcat_wire::frame::MacAddress;
-use ringcat_wire::master_frame::{Phase, Stage};
+use ringcat_wire::master_frame::{Phase, Stage, header_of_frame};
 
 use super::Exchange;
 use super::partner::{Difference, Items};
@@ -39,6 +39,7 @@ impl Exchange {
         header.first = before.next().number();
         header.frames = self.sequence.since(before) as u16;
         header.item = state.items.next();
+        header.write = state.words.write();
         let (board, domains, counters) = (&*self.board, &self.domains[..], &self.tally.counters);
         let ring = self.evidence.monitor.state();
         state.frames.load(&Sources { board, words: &state.words, domains, counters, ring });
@@ -94,6 +95,9 @@ impl Exchange {
     pub(in crate::exchange) fn note_foreign(&mut self, arrived_on: Link, bytes: &[u8]) {
         if let Some(source) = bytes.get(6..).and_then(<[u8]>::first_chunk) {
             self.note_collision(arrived_on, MacAddress(*source));
+        }
+        if let (Some(state), Some(header)) = (self.standby.0.as_deref_mut(), header_of_frame(bytes)) {
+            state.collided_write = header.write;
         }
     }
 

@@ -1,6 +1,7 @@
 //! Changes of the role, at the beginning of a cycle (protocol MR-02, MR-07).
 
 use ringcat_wire::master_frame::{Answer, Header, Phase};
+use ringcat_wire::memory_write::MemoryWrite;
 
 use super::Exchange;
 use super::state::State;
@@ -12,11 +13,14 @@ use crate::event::CyclicStandbyEvent;
 use crate::exchange::domain::Domain;
 use crate::exchange::flight::CyclicFrame;
 use crate::link::Link;
+use crate::queue::Producer;
 use crate::role::{MainDeviceRole, RoleCause, RoleRequest};
 use crate::time::Instant;
 
 /// Acyclic frames of the ACTIVE before may be read for this time after it has handed its role over.
 const LAST_FRAMES_NS: u64 = 100_000_000;
+/// The ACTIVE goes on if its last cycle began at most this number of periods ago: less than any time-out (protocol 9.9).
+const GOES_ON: u128 = 3;
 
 /// What the beginning of a cycle does to the role.
 enum Change {
@@ -38,7 +42,7 @@ impl Exchange {
     fn begin_role_of_two(&mut self, now: Instant) -> Option<MainDeviceRole> {
         self.note_acyclic_collision();
         let state = self.standby.0.as_deref_mut()?;
-        let request = if state.control.is_requested() { state.control.take_request() } else { None };
+        let request = if state.control.is_requested() { state.permitted_request(now, &mut self.events) } else { None };
         let change = match state.role {
             MainDeviceRole::Active => {
                 if request == Some(RoleRequest::HandOver) {
@@ -98,6 +102,7 @@ impl Exchange {
         };
         state.words.post_takeover(takeover);
         let silence = last.map(|(_, at)| now.since(at));
+        let cut = last.and_then(|(cycle, _)| state.following.header_of(cycle)).and_then(|(header, _)| header.write);
         if let Some((cycle, _)) = last {
             state.frames.cycle = cycle;
         }
@@ -106,7 +111,7 @@ impl Exchange {
         state.acyclic_counts_from = left + last_frames.div_ceil(state.period_ns.max(1));
         state.become_role(MainDeviceRole::Active);
         let is_hot = takeover != Takeover::ThroughInit;
-        self.events.push(CyclicStandbyEvent::TookOver { silence, in_state, is_hot }.pack());
+        self.events.push(CyclicStandbyEvent::TookOver { silence, in_state, is_hot, cut }.pack());
     }
 
     /// The other MainDevice may control the bus from this cycle on: nothing is sent any more.
@@ -133,11 +138,36 @@ impl State {
     fn become_role(&mut self, role: MainDeviceRole) {
         self.role = role;
         self.watch.forget();
-        (self.foreign_in, self.collided_with) = (0, None);
+        (self.foreign_in, self.collided_with, self.collided_write) = (0, None, None);
         (self.shown, self.noticed) = (None, None);
         let (identity, item) = (self.following.answer.identity, self.items.first());
         self.following.answer = Answer { identity, item, ..Answer::new() };
         self.control.set(role);
+    }
+
+    /// Takes the request. One that would cut off a write into the memory of a SubDevice is refused, if it is not forced:
+    /// the own write as ACTIVE, that of an ACTIVE which goes on as INACTIVE.
+    #[cold]
+    fn permitted_request(&mut self, now: Instant, events: &mut Producer) -> Option<RoleRequest> {
+        let (request, is_forced) = self.control.take_request()?;
+        let write = match (self.role, request) {
+            _ if is_forced => None,
+            (MainDeviceRole::Active, RoleRequest::Inactive | RoleRequest::HandOver) => self.words.write(),
+            (MainDeviceRole::Inactive, RoleRequest::Active) => self.write_of_other(now),
+            (MainDeviceRole::Active, RoleRequest::Active)
+            | (MainDeviceRole::Inactive, RoleRequest::Inactive | RoleRequest::HandOver) => None,
+        };
+        let Some(write) = write else { return Some(request) };
+        events.push(CyclicStandbyEvent::RoleRefused(write).pack());
+        None
+    }
+
+    /// The write that the ACTIVE does, if its last cycle has just come.
+    fn write_of_other(&self, now: Instant) -> Option<MemoryWrite> {
+        let (cycle, begun_at) = self.following.newest()?;
+        let goes_on = now.since(begun_at).as_nanos() < u128::from(self.period_ns) * GOES_ON;
+        let (header, _) = self.following.header_of(cycle).filter(|_| goes_on)?;
+        header.write
     }
 
     /// What this MainDevice goes on with as ACTIVE. SubDevices stay as they are only if their registers are those of

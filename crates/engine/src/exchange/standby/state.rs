@@ -4,6 +4,7 @@ use alloc::boxed::Box;
 use alloc::sync::Arc;
 
 use ringcat_wire::frame::MacAddress;
+use ringcat_wire::memory_write::MemoryWrite;
 
 use super::partner::{Items, PartnerWatch};
 use crate::board::standby::StandbyWords;
@@ -66,6 +67,8 @@ pub(in crate::exchange) struct State {
     pub acyclic_counts_from: u64,
     /// Its sender, until the application has asked for it.
     pub collided_with: Option<MacAddress>,
+    /// The write into the memory of a SubDevice that it does, as its last master frame says.
+    pub collided_write: Option<MemoryWrite>,
     /// A version of the ACTIVE that cannot be read, and was reported.
     pub other_version: Option<u8>,
     /// The newest cycle of the ACTIVE when the last cycle of this MainDevice began.

@@ -4,6 +4,7 @@ use alloc::borrow::ToOwned;
 use alloc::vec;
 
 use ringcat_wire::mailbox::foe::FoeMessage;
+use ringcat_wire::memory_write::WriteKind;
 
 use super::error::{FoeError, FoeFailure};
 use super::{FoeOptions, FoeProgress, Transfer};
@@ -30,6 +31,7 @@ async fn run(
     progress: impl FnMut(FoeProgress),
 ) -> Result<u64, FoeFailure> {
     let mut transfer = Transfer::begin(mailbox, options, progress).await?;
+    let _write = mailbox.begin_memory_write(WriteKind::File);
     let full = FoeMessage::max_data(transfer.conversation.mailbox_sizes().receive);
     if full == 0 {
         return Err(FoeFailure::SmallMailbox);
