@@ -83,7 +83,7 @@ pub use ethernet::EthernetSubDevice;
 pub use found::DeclaredSubDevice;
 pub use image_memory::ImageMemory;
 #[cfg(feature = "standby")]
-pub use listener::{Heard, Listener};
+pub use listener::{Heard, HeardDiagnosis, Listener};
 pub use live_status::{LiveStatus, LostCopies, SegmentStatus, SubDeviceStatus, WkcShare};
 pub use options::Options;
 pub use pending::Pending;

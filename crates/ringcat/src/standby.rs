@@ -12,6 +12,7 @@
 //! thread. Below that are an [`Engine`](crate::Engine) with [`EngineOptions::standby`] and the
 //! [`Exchange`](crate::Exchange) of its application, which `docs/standby.md` describes.
 
+mod diagnosis;
 #[cfg(feature = "packet")]
 pub mod guard;
 mod joining;
@@ -25,13 +26,15 @@ use std::time::Duration;
 pub use ringcat_engine::event::StandbyEvent;
 pub use ringcat_engine::layout::MasterSizes;
 use ringcat_engine::link::Link;
-pub use ringcat_engine::main_device::{Active, Heard, Listener, Options as EngineOptions, StandbyOptions};
+pub use ringcat_engine::main_device::{
+    Active, Heard, HeardDiagnosis, Listener, Options as EngineOptions, StandbyOptions,
+};
 pub use ringcat_engine::role::{Partner, RoleCause, RoleControl, RoleRequest};
 pub use ringcat_engine::standby::{Forwarder, NotForwarded, Onward};
 use ringcat_engine::time::Instant;
 pub use ringcat_engine::{Class, class_of};
 use ringcat_wire::frame::MacAddress;
-pub use ringcat_wire::master_frame::{NotReady, Stage};
+pub use ringcat_wire::master_frame::{Diagnosis, DomainRecord, NotReady, Stage};
 pub use ringcat_wire::memory_write::{MemoryWrite, WriteKind};
 
 pub use self::joining::{Joining, Next};

@@ -1,8 +1,10 @@
 //! An INACTIVE MainDevice without an application: it listens to the ACTIVE, and learns what it needs to follow
 //! (protocol 9.10).
 
+use ringcat_wire::master_frame::{Diagnosis, DomainRecord};
+
 use super::MainDevice;
-use super::listener::{Heard, Listener, known};
+use super::listener::{Heard, HeardDiagnosis, Listener, known};
 use crate::event::{Event, StandbyEvent};
 use crate::knowledge::Knowledge;
 use crate::link::Link;
@@ -56,6 +58,18 @@ impl MainDevice {
     /// ([`MainDevice::follow`]); `None` before all of it has arrived.
     pub fn heard_knowledge(&self) -> Option<Knowledge> {
         known(&self.standby.as_ref()?.words.heard)
+    }
+
+    /// What the ACTIVE sees of the segment: its counters, carriers and domains (protocol MR-14, MR-19), as of the last
+    /// cycle that has arrived as a whole; `None` before one, and without the options of MainDevice redundancy.
+    /// [`HeardDiagnosis::at`] says how old it is: without an ACTIVE it remains.
+    pub fn heard_diagnosis(&self) -> Option<HeardDiagnosis> {
+        let words = &self.standby.as_ref()?.words;
+        let (_, bytes) = words.diagnosis.copy()?;
+        let counters = Diagnosis::decode(&bytes).ok()?;
+        let domains = bytes.get(Diagnosis::LEN..)?.chunks_exact(DomainRecord::LEN);
+        let domains = domains.filter_map(|record| DomainRecord::decode(record).ok()).collect();
+        Some(HeardDiagnosis { at: words.heard_at(), counters, domains })
     }
 
     /// What this MainDevice knew of the segment when it was ACTIVE last.

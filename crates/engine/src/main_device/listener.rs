@@ -4,9 +4,10 @@
 //! share words.
 
 use alloc::sync::Arc;
+use alloc::vec::Vec;
 use core::time::Duration;
 
-use ringcat_wire::master_frame::{Header, Lengths, NotReady};
+use ringcat_wire::master_frame::{Diagnosis, DomainRecord, Header, Lengths, NotReady};
 
 use crate::board::sheet::Sheet;
 use crate::board::standby::StandbyWords;
@@ -25,6 +26,18 @@ pub struct Heard {
     pub period: Option<Duration>,
     /// All that is needed to follow it has arrived.
     pub is_known: bool,
+}
+
+/// What the ACTIVE has said of the segment and of its frames.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct HeardDiagnosis {
+    /// When a frame of another MainDevice came last.
+    pub at: Option<Instant>,
+    /// State of the ring, carriers, SubDevices that answer, and the counters of its frames and cycles.
+    pub counters: Diagnosis,
+    /// Its domains, in the order of the declaration.
+    pub domains: Vec<DomainRecord>,
 }
 
 /// Takes what an INACTIVE MainDevice without an application hears of the ACTIVE, in any thread.

@@ -6,7 +6,8 @@ use ringcat::standby::StandbyEvent;
 use ringcat::standby::{Partner, RoleRequest};
 use ringcat::{ActivateError, Denial};
 use ringcat::{Function, MainDeviceRole, SubDeviceId};
-use ringcat_sim::cable::Host;
+use ringcat_sim::cable::{CableId, Host};
+use ringcat_sim::fault::Fault;
 use ringcat_wire::al::AlState;
 use scenarios::two::{CYCLE, Settings, Two};
 
@@ -70,6 +71,30 @@ fn states_and_counts_of_the_inactive_are_those_that_the_active_sees() {
     let [ours, theirs] = [first.engine.ring_status(), second.engine.ring_status()];
     assert_eq!(ours.state, theirs.state);
     assert_eq!(ours.links.map(|link| link.answering), theirs.links.map(|link| link.answering));
+}
+
+// covers: MR-14, MR-19, REQ045, standby
+#[test]
+fn counters_of_the_active_are_readable_at_the_inactive() {
+    let mut two = followed();
+    two.run(Duration::from_millis(100));
+    let before = two.controllers[1].engine.heard_diagnosis().expect("it has come");
+    assert!(before.at.is_some_and(|at| two.now().since(at) <= 2 * CYCLE));
+    assert_eq!((before.counters.ring, before.counters.carriers), (1, 0b1010));
+    assert_eq!(before.counters.answering, [8, 0]);
+    two.fault(Fault::Cut(CableId(4)));
+    two.run(Duration::from_millis(100));
+    let after = two.controllers[1].engine.heard_diagnosis().expect("it has come");
+    assert_eq!((after.counters.ring, after.counters.answering), (2, [4, 4]), "{}", two.log());
+    let own = *two.controllers[0].exchange().counters();
+    // The diagnosis is of the cycle before, and the last one is still under way.
+    let sent = (own.sent - after.counters.sent, after.counters.sent - before.counters.sent);
+    assert!(sent.0 <= 20 && sent.1 >= 100, "{sent:?}");
+    let [lost, incomplete] = [own.lost, own.incomplete];
+    assert_eq!([after.counters.lost, after.counters.incomplete], [lost, incomplete]);
+    assert_eq!(after.domains.len(), 1);
+    assert_eq!((after.domains[0].state, after.domains[0].wkc), (2, after.domains[0].expected));
+    assert!(two.controllers[0].engine.heard_diagnosis().is_none(), "it is ACTIVE, and has heard none");
 }
 
 // covers: REQ010, MR-15, standby

@@ -5,6 +5,7 @@ mod adoption;
 mod clocks;
 mod collisions;
 mod following;
+mod hot_connect;
 mod library;
 mod memory_writes;
 mod outside_links;

@@ -28,7 +28,10 @@ fn a_requested_role_takes_effect_at_the_next_cycle_and_is_reported_once() {
     let changed = CyclicStandbyEvent::RoleChanged(MainDeviceRole::Active, RoleCause::Requested);
     let events = duo.second.standby_events();
     assert!(events.contains(&changed) && events.len() == 2, "{events:?}");
-    assert!(matches!(events[1], CyclicStandbyEvent::TookOver { in_state: 3, is_hot: true, silence: Some(_), cut: None }));
+    assert!(matches!(
+        events[1],
+        CyclicStandbyEvent::TookOver { in_state: 3, is_hot: true, silence: Some(_), cut: None }
+    ));
     duo.second.control.request(RoleRequest::Active);
     assert_eq!(duo.second.exchange.begin_role(duo.now + PERIOD), None);
     assert!(duo.second.standby_events().is_empty(), "the present role is no change");
