@@ -250,7 +250,7 @@ mod tests {
 
     // covers: SM-09
     #[test]
-    fn frames_of_a_maindevice_with_the_same_identity_are_told_and_forwarded() {
+    fn frames_of_a_maindevice_with_the_same_identity_are_counted_and_forwarded() {
         let late = NOW + OWN_FRAMES_COME_FOR + Duration::from_nanos(1);
         for (forwarder, now) in [(forwarder(), Instant(0)), (forwarder().after_sending(NOW), late)] {
             let onward = forwarder.forward(&mut own(OWN_REDUNDANT), Link::Redundant, BOTH, now);

@@ -23,7 +23,7 @@ pub enum StandbyEvent {
         cause: RoleCause,
     },
     /// This MainDevice controls the bus, and goes on with the process data of the other one; with its own if it was
-    /// ACTIVE itself and has heard no other MainDevice since.
+    /// ACTIVE itself and has received no frame of another MainDevice since.
     TookOver {
         /// Time since a frame of the other MainDevice came last; `None` if none has come.
         silence: Option<Duration>,

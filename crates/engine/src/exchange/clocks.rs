@@ -159,7 +159,7 @@ enum WantedTime {
     Application(ReferenceTime),
 }
 
-/// State of the clocks as the exchange sees it.
+/// State of the clocks in the exchange.
 #[derive(Debug, Default)]
 pub(crate) struct Clocks {
     setup: ClockSetup,

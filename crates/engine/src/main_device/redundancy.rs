@@ -1,4 +1,4 @@
-//! MainDevice redundancy: the role, what was heard of the other MainDevice, and what it needs of this one.
+//! MainDevice redundancy: the role, what has arrived from the other MainDevice, and what it needs of this one.
 
 use alloc::vec::Vec;
 use core::time::Duration;
