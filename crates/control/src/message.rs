@@ -61,7 +61,7 @@ pub enum Content {
     },
     /// The answer.
     Answer(Numbered<Result<Answer, Refusal>>),
-    /// A client wants to drive a master.
+    /// A client requests a master, to drive it.
     Take {
         /// Number of the master.
         master: u32,

@@ -211,7 +211,7 @@ impl CyclicStatus {
         self.wanted.fetch_or(SNAPSHOT, Ordering::Release);
     }
 
-    /// Whether a reader wants anything.
+    /// Whether a reader has requested anything.
     #[inline(always)]
     pub(crate) fn is_any_wanted(&self) -> bool {
         self.wanted.load(Ordering::Relaxed) != 0

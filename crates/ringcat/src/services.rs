@@ -136,8 +136,8 @@ pub trait Services: Sized {
         self.immediately(move |engine| engine.events_since(number))
     }
 
-    /// Registers a client of events with a queue of its own, of `size` events and with the subjects that it asks for. A
-    /// client that does not fetch loses its own oldest events only. `None` if there are 64 clients.
+    /// Registers a client of events with a queue of its own, of `size` events and with the subjects that it subscribes
+    /// to. A client that does not fetch loses its own oldest events only. `None` if there are 64 clients.
     fn register_client(self, subjects: Subjects, size: usize) -> Self::Immediate<Option<ClientId>> {
         self.immediately(move |engine| engine.register_client(subjects, size))
     }
@@ -195,8 +195,8 @@ pub trait Services: Sized {
     }
 
     /// Sets the role. [`MainDeviceRole::Inactive`] ends all that runs, and functions that need the bus are refused from
-    /// then on ([`Function::needs_the_bus`]); with [`MainDeviceRole::Active`] the MainDevice goes on with what it knows
-    /// ([`Engine::set_role`]).
+    /// then on ([`Function::needs_the_bus`]); with [`MainDeviceRole::Active`] the MainDevice continues with its
+    /// knowledge ([`Engine::set_role`]).
     fn set_role(self, role: MainDeviceRole) -> Self::Immediate<()> {
         self.immediately(move |engine| engine.set_role(role))
     }

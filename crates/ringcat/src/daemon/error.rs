@@ -19,7 +19,7 @@ pub enum DaemonError {
     Client(ClientError),
     /// The links cannot be used.
     Links(LinkError),
-    /// What the daemon knows cannot be used.
+    /// The knowledge of the daemon cannot be used.
     Knowledge(KnowledgeError),
     /// The MainDevice reports an error.
     Bus(Error),

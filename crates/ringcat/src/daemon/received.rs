@@ -27,7 +27,7 @@ pub(super) struct Received {
     pub cyclic: DaemonLinks,
     /// Links of the acyclic half.
     pub acyclic: DaemonLinks,
-    /// A daemon that is started anew sees by it that this process has the bus.
+    /// A daemon that is started anew detects by it that this process has the bus.
     pub lock: Option<OwnedFd>,
     /// Network interfaces of EoE.
     pub interfaces: Vec<OwnedFd>,
