@@ -20,7 +20,7 @@ use crate::surroundings::Surroundings;
 use crate::table;
 use crate::verdict::{Report, Verdict};
 
-/// What a user should know before.
+/// Notices for the user, printed first.
 const ABOUT_SCAN: &str = "\
 All SubDevices go to INIT: a segment that is in operation leaves it. So a scan
 refuses to begin where another MainDevice uses the interface or sends into the

@@ -99,7 +99,7 @@ pub struct PolicyArguments {
     timeout: u32,
     /// How long this one listens at its start; a random pause up to this time follows
     ///
-    /// Where it hears no ACTIVE it becomes ACTIVE then.
+    /// If no frame of an ACTIVE arrives, it becomes ACTIVE then.
     #[arg(long, value_name = "TIME", value_parser = time, default_value = "2s", requires = "declaration")]
     listen: Duration,
     /// Stay INACTIVE: neither take over, nor be handed the role over

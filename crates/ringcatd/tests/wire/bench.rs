@@ -93,7 +93,7 @@ impl Bench {
         let (near, far) = (format!("ringcatd{id}near"), format!("ringcatd{id}far"));
         let place = std::env::temp_dir().join(&near);
         fs::create_dir_all(&place).expect("it can be made");
-        fs::set_permissions(&place, fs::Permissions::from_mode(0o777)).expect("it is ours");
+        fs::set_permissions(&place, fs::Permissions::from_mode(0o777)).expect("it is writable");
         fs::write(place.join("segment.toml"), segment).expect("it can be written");
         copy_program(&std::env::current_exe().expect("it is known"), &place.join("test"));
         for namespace in [&near, &far] {
@@ -146,7 +146,7 @@ impl Bench {
         // Files of root beside the socket stay.
         for entry in fs::read_dir(&self.place).expect("it is there").flatten() {
             if entry.file_name().to_string_lossy().ends_with(".lock") {
-                fs::remove_file(entry.path()).expect("it is ours");
+                fs::remove_file(entry.path()).expect("it is writable");
             }
         }
         self.start_program(

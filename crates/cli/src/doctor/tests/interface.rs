@@ -70,7 +70,7 @@ const DEVICE: [Case; 9] = [
 
 // covers: bench
 #[test]
-fn what_the_kernel_and_the_driver_tell_of_an_interface_is_judged() {
+fn what_the_kernel_and_the_driver_report_of_an_interface_is_rated() {
     for (id, level, what, mend, change) in USES.into_iter().chain(DEVICE) {
         let mut specimen = Specimen::good();
         change(&mut specimen);
