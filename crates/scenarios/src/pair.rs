@@ -194,7 +194,7 @@ impl Pair {
         self.seen(host).incomplete
     }
 
-    /// The ring as the ACTIVE on a host sees it.
+    /// State of the ring in the ACTIVE on a host.
     pub fn ring(&self, host: Host) -> RingState {
         self.seen(host).ring
     }

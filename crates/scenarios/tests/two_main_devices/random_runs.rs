@@ -72,7 +72,7 @@ impl Trouble {
 
     /// Longest time without outputs if nothing else happens; `detection` is the time until a port detects its link.
     fn longest_gap(self, detection: Duration) -> Duration {
-        // A cycle of which only the first frame has come counts as heard.
+        // A cycle of which only the first frame has arrived restarts the time-out.
         let time_out = CYCLE * (TIME_OUT_CYCLES + 2);
         match self {
             Trouble::Killed(Side::Active) | Trouble::Hangs(Side::Active, _) | Trouble::PowerOff(Side::Active) => {
@@ -296,9 +296,9 @@ fn seeds_0_to_20_hold_under_faults_of_both_maindevices_and_the_cables() {
     run_all(0..20);
 }
 
-/// Faults that were found: an ACTIVE went through INIT although it had heard no other one (1, 2); two scanned at the
-/// same time for ever (131); no more rounds of reads after a role that ended during one (826); no yield after a
-/// takeover during a scan of the other MainDevice (1307); a takeover each time-out during such a scan (4614).
+/// Faults that were found: an ACTIVE went through INIT although it had received no frame of another one (1, 2); two
+/// scanned at the same time for ever (131); no more rounds of reads after a role that ended during one (826); no yield
+/// after a takeover during a scan of the other MainDevice (1307); a takeover each time-out during such a scan (4614).
 // covers: standby, MR-10, MR-16
 #[test]
 fn seeds_that_found_faults_hold() {
