@@ -32,12 +32,6 @@ impl MainDevice {
         self.standby.as_ref()?.words.header()
     }
 
-    /// Digest of the configuration of the active application; `None` without one.
-    pub fn configuration_digest(&self) -> Option<u64> {
-        self.active()?;
-        Some(self.standby.as_ref()?.configuration.digest())
-    }
-
     /// LRW is not allowed: the INACTIVE takes outputs from frames that have passed SubDevices (protocol REQ047).
     pub(super) fn is_lrw_refused(&self, lrw: LrwPolicy) -> bool {
         self.standby.is_some() && lrw == LrwPolicy::PerSubDevice
