@@ -32,7 +32,7 @@ pub enum StandbyEvent {
         /// They keep their configuration; otherwise all are configured again from INIT on.
         is_hot: bool,
     },
-    /// What this MainDevice, as ACTIVE, knows of the other one has changed.
+    /// The state of the other MainDevice has changed, as determined by this one as ACTIVE.
     Partner(Partner),
     /// A frame of another MainDevice came while this one is ACTIVE (protocol MR-10).
     Collision {

@@ -1,4 +1,4 @@
-//! What a MainDevice of two has: options, what both halves share, and the state of the other MainDevice.
+//! Data of one of two MainDevices in a ring: options, what both halves share, and the state of the other MainDevice.
 
 use alloc::sync::Arc;
 
