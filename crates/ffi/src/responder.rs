@@ -82,7 +82,7 @@ impl DaemonResponder {
 }
 
 impl Responder {
-    /// Asks, and waits for the answer. `bytes` is data to write; with the answer comes data that was read.
+    /// Sends a query, and waits for the answer. `bytes` is data to write; with the answer comes data that was read.
     ///
     /// # Errors
     /// What [`code_of`] turns into a return code.

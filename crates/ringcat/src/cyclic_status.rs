@@ -206,7 +206,7 @@ impl CyclicStatus {
         set(received, counters.received);
     }
 
-    /// Wants a snapshot ([`crate::observer`]).
+    /// Requests a snapshot ([`crate::observer`]).
     pub(crate) fn want_snapshot(&self) {
         self.wanted.fetch_or(SNAPSHOT, Ordering::Release);
     }

@@ -100,7 +100,7 @@ impl OwnerLink {
         self.questions.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Asks, and waits for the answer: a second for a sign, longer for the result of what it has begun.
+    /// Sends a query, and waits for the answer: a second for a sign, longer for the result of what it has begun.
     ///
     /// # Errors
     /// The owner refuses, is silent, or has ended.

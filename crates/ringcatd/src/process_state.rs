@@ -1,8 +1,8 @@
 //! What the kernel reports about the process of an owner before its end is detected elsewhere.
 //!
 //! The end of a stream and a pidfd wait until the memory of a process is torn down, and until its core is written. The
-//! flags of the process tell at once that a signal ends it (`PF_SIGNALED`, `PF_DUMPCORE` of `linux/sched.h`, field 9 of
-//! `/proc/PID/stat`). A heartbeat could not tell a process that ends from one that waits for a processor.
+//! flags of the process show at once that a signal ends it (`PF_SIGNALED`, `PF_DUMPCORE` of `linux/sched.h`, field 9 of
+//! `/proc/PID/stat`). A heartbeat could not distinguish a process that ends from one that waits for a processor.
 
 use std::fs::File;
 use std::io::{self, Read, Seek};

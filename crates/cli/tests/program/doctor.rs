@@ -104,7 +104,7 @@ fn the_page_of_the_doctor_explains_each_finding() {
     assert!(missing.is_empty(), "{missing:?}");
 }
 
-/// Files that a command opens for writing or makes, and requests that change an interface, as strace sees them.
+/// Files that a command opens for writing or makes, and requests that change an interface, as recorded by strace.
 fn written(trace: &str) -> Vec<&str> {
     let calls = trace.lines().filter(|line| !line.contains(" = -1 "));
     let opens = |line: &&str| {

@@ -279,7 +279,7 @@ fn a_folder_of_descriptions_is_listed_and_searched() {
 
 // covers: eni-read, network-file, esi-use, ES-07
 #[test]
-fn what_is_no_regular_file_is_refused_and_never_waited_for() {
+fn pipes_and_devices_are_refused_as_files_without_a_wait() {
     let place = Place::new("pipes");
     let (pipe, out) = (place.path("pipe.xml"), place.path("out.xml"));
     assert!(Command::new("mkfifo").arg(&pipe).status().expect("it is there").success());

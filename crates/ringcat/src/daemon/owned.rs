@@ -34,7 +34,7 @@ use crate::supervisor_thread::SupervisorThread;
 const RELEASE: Duration = Duration::from_secs(2);
 /// Interval of checks for its answer.
 const PAUSE: Duration = Duration::from_micros(200);
-/// Events of scans that are kept between two looks: one is enough to tell that there were any.
+/// Events of scans that are kept between two checks: one is enough to show that there were any.
 const KEPT: usize = 1;
 
 /// A bus that a daemon has handed over. It is given back by [`OwnedBus::release`], or when this is dropped.

@@ -36,7 +36,7 @@ pub(super) struct Received {
 }
 
 impl Received {
-    /// Asks for the bus of a master, and waits for it. Its links order what they cannot do themselves.
+    /// Requests the bus of a master, and waits for it. Its links order what they cannot do themselves.
     ///
     /// # Errors
     /// The daemon refuses or gives no answer, or what it has sent cannot be used.

@@ -22,7 +22,7 @@ use crate::window::Window;
 /// Longest time of listening before it is decided again whether there is an ACTIVE.
 const SLICE: Duration = Duration::from_millis(10);
 
-/// What a MainDevice of two does next, before it has an application.
+/// The next step of one of two MainDevices, before it has an application.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Next {

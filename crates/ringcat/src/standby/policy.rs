@@ -1,5 +1,5 @@
-//! When a MainDevice of two takes the role of the ACTIVE, and when it gives it up: a ready-made policy (protocol 9.6,
-//! 9.9).
+//! When one of two MainDevices takes the role of the ACTIVE, and when it gives it up: a ready-made policy (protocol
+//! 9.6, 9.9).
 //!
 //! In: the role, when a frame of the other MainDevice arrived last, whether two are ACTIVE, and the time. Out: a
 //! request. An application that decides itself has no policy, and uses [`RoleControl`](super::RoleControl).
@@ -29,7 +29,7 @@ pub enum OnCollision {
     Stay,
 }
 
-/// When a MainDevice of two takes over, and when it yields.
+/// When one of two MainDevices takes over, and when it yields.
 ///
 /// ```
 /// use std::time::Duration;

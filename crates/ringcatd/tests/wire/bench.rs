@@ -260,15 +260,15 @@ impl Bench {
 
     /// When the daemon's first frame arrived after this time: the first acyclic one that no cyclic frame follows.
     pub fn first_frame(&self, after_ns: u64) -> Duration {
-        let own = self.place.join("asks");
+        let own = self.place.join("answers");
         let _ = fs::remove_file(&own);
-        let asks = UnixDatagram::bind(&own).expect("it can be made");
-        asks.set_read_timeout(Some(Duration::from_secs(5))).expect("a socket");
+        let socket = UnixDatagram::bind(&own).expect("it can be made");
+        socket.set_read_timeout(Some(Duration::from_secs(5))).expect("a socket");
         let begin = Instant::now();
         loop {
-            asks.send_to(&after_ns.to_ne_bytes(), self.place.join("times")).expect("the segment runs");
+            socket.send_to(&after_ns.to_ne_bytes(), self.place.join("times")).expect("the segment runs");
             let mut answer = [0; 8];
-            asks.recv(&mut answer).expect("the segment answers");
+            socket.recv(&mut answer).expect("the segment answers");
             match u64::from_ne_bytes(answer) {
                 0 => assert!(begin.elapsed() < LONG, "no frame of the daemon"),
                 at => return Duration::from_nanos(at - after_ns),

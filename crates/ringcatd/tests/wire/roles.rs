@@ -64,7 +64,7 @@ fn end_with_the_test() {
     std::process::exit(1);
 }
 
-/// Asks a web server: fails if it does not answer.
+/// Sends a request to a web server: fails if it does not answer.
 fn fetch() {
     let address = std::env::var(ADDRESS).expect("the test says which").parse().expect("it is one");
     let mut stream = TcpStream::connect_timeout(&address, FETCH).expect("it answers");

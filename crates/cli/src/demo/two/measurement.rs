@@ -346,7 +346,7 @@ mod tests {
 
     // covers: demo, standby, MR-10
     #[test]
-    fn both_controllers_are_together_from_the_second_ones_first_frame_on() {
+    fn both_controllers_send_from_the_first_frame_of_the_second_one_on() {
         let identities = [[0, 0x53, 0x01], [0, 0x53, 0x11]];
         let mut network = Network::new(Vec::new(), Vec::new(), Default::default()).expect("it is empty");
         let mut measurement = Measurement::new(&mut network, &[], Duration::from_millis(1), identities);

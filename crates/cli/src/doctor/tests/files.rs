@@ -170,7 +170,7 @@ const FAULTS: [Fault; 26] = [
 
 // covers: bench
 #[test]
-fn each_fault_in_a_file_is_found_with_what_mends_it() {
+fn each_fault_in_a_file_is_found_with_its_correction() {
     for (id, level, what, mend, files) in FAULTS {
         let findings = with(files);
         assert_finding(&findings, id, level, what, mend);
