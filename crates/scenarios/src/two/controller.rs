@@ -1,4 +1,4 @@
-//! One MainDevice of two: its engine, its application, and its way to forward.
+//! One of two MainDevices: its engine, its application, and its way to forward.
 
 use ringcat::standby::{
     Active, Class, EngineOptions, Forwarder, Partner, RoleControl, RoleRequest, StandbyOptions, class_of,

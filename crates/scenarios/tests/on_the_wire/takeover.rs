@@ -160,7 +160,7 @@ fn an_active_that_loses_all_its_cables_yields_and_follows_when_they_are_back() {
 
 // covers: standby, MR-09, MR-10, MR-24, REQ016, REQ048
 #[test]
-fn of_two_controllers_that_each_have_half_the_ring_one_yields_when_it_is_mended() {
+fn of_two_controllers_with_half_the_ring_each_one_yields_when_it_is_repaired() {
     let Some(pair) = Pair::new() else { return };
     let (first, second) = pair.in_op(&[]);
     pair.bench.order("cut 4-5");

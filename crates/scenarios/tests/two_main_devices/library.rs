@@ -248,7 +248,7 @@ fn an_active_that_loses_its_links_and_gets_them_back_follows_the_other_one() {
 
 // covers: standby, MR-16, MR-25, MR-27
 #[test]
-fn an_active_that_no_other_one_replaces_goes_on_with_its_subdevices() {
+fn an_active_without_a_successor_continues_with_its_subdevices() {
     // How many cycles its links are down. Watchdogs expire after 100.
     for (count, down) in [(3, 0), (8, 0), (8, 30), (33, 30), (8, 150)] {
         let mut pair = Pair::of_members(13, ring_of_two(count, Host::First));
