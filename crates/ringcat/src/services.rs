@@ -68,7 +68,7 @@ pub trait Services: Sized {
     type Immediate<T>;
 
     /// Starts an async function of the engine. All other services use this method; only the library can call it, as
-    /// no other crate can name [`Sealed`](sealed::Sealed):
+    /// no other crate can name `Sealed`:
     ///
     /// ```compile_fail,E0603
     /// use ringcat::services::sealed::Sealed;

@@ -4,8 +4,8 @@
 use std::time::Duration;
 
 use ringcat::{
-    Address, Application, Declaration, DomainId, Error, LastOutputs, MainDevice, Options, Position, Services,
-    SubDeviceConfig, SubDeviceId,
+    Address, Application, Declaration, DomainId, Error, LastOutputs, MainDevice, Options, Position, SubDeviceConfig,
+    SubDeviceId,
 };
 use ringcat_engine::main_device::{EthernetSubDevice, MainDevice as Engine};
 use ringcat_sim::cable::DeviceIndex;
