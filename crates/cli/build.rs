@@ -1,7 +1,7 @@
 //! A release of the program `ringcat` has no symbols. Other programs of the workspace keep theirs, because benches
 //! count calls and instructions by function; a profile of Cargo has one setting for all of them. Functions with the
 //! same instructions, mostly those of generic types, are in it once, if the linker is the one that Rust has by default
-//! on x86-64 Linux; others may not know the option.
+//! on x86-64 Linux; others may not have the option.
 
 use std::env;
 

@@ -20,7 +20,7 @@ const WIDTH: usize = 80;
 /// Columns of the kind of a difference, and the blanks before it.
 const KIND: usize = 16;
 
-/// What a user should know before.
+/// Text at the end of the long help.
 const ABOUT_COMPARE: &str = "\
 A SubDevice that is missing or additional is one difference, not another
 identity of all SubDevices behind it. Differences that prevent OP are marked

@@ -22,7 +22,7 @@ use crate::output::{counted, say, warn};
 use crate::times::{cycle, in_words};
 use crate::verdict::{Report, Verdict};
 
-/// What a user should know before.
+/// Text at the end of the long help.
 const ABOUT_INIT: &str = "\
 The file has the SubDevices in their order with vendor, product, PDOs, names of
 variables, mailboxes and cables, as found. `ringcat run --network FILE` brings

@@ -138,7 +138,7 @@ impl InterfaceArguments {
     }
 
     /// Looks for other MainDevices before anything is sent. The sockets are open already: of two commands that begin at
-    /// one time at least one sees the other.
+    /// one time at least one detects the other.
     fn check(&self) -> Result<(), Failure> {
         check_sockets(self.links.all(), self.force)?;
         self.await_carrier()?;

@@ -124,7 +124,7 @@ fn station(inspection: &RingInspection, position: Position) -> Option<StationAdd
     inspection.stations.get(usize::from(position.0)).copied().filter(|station| station.0 != 0)
 }
 
-/// The SubDevices at both ends of a cable. This command knows no declaration.
+/// The SubDevices at both ends of a cable. This command has no declaration.
 fn ends(inspection: &RingInspection, cable: Cable) -> [Option<Occupant>; 2] {
     cable.positions().map(|position| Some(Occupant::new(station(inspection, position?)?, None)))
 }

@@ -20,7 +20,7 @@ use crate::surroundings::Surroundings;
 use crate::table;
 use crate::verdict::{Report, Verdict};
 
-/// What a user should know before.
+/// Text at the end of the long help.
 const ABOUT_SCAN: &str = "\
 All SubDevices go to INIT: a segment that is in operation leaves it. So a scan
 refuses to begin where another MainDevice uses the interface or sends into the
@@ -36,7 +36,7 @@ pub struct ScanArguments {
     access: AccessArguments,
     /// List the PDOs of each SubDevice with their entries, as far as they are known
     ///
-    /// From its EEPROM; a daemon also knows those of a dictionary that it has read.
+    /// From its EEPROM; a daemon also has those of a dictionary that it has read.
     #[arg(long, help_heading = "Output")]
     pdos: bool,
     #[command(flatten)]
@@ -104,7 +104,7 @@ fn show(with_pdos: bool, objects: &[ObjectNames], scan: &Scan) -> scan::Scan {
     json
 }
 
-/// What a daemon knows of the bus of a master. Nothing is scanned: a daemon does that after each change.
+/// Knowledge of a daemon about the bus of a master. Nothing is scanned: a daemon does that after each change.
 fn known(arguments: &ScanArguments, mut descriptions: Option<Descriptions>) -> Result<Report, Failure> {
     let access = &arguments.access;
     let Access { supervisor, cyclic, recording, tenure, .. } = access.begin(&access.interfaces.options())?;

@@ -134,7 +134,7 @@ impl Client {
         self.daemon_pid
     }
 
-    /// Asks about a master; `bytes` is data to write. Returns the answer, and data that was read.
+    /// Sends a query about a master; `bytes` is data to write. Returns the answer, and data that was read.
     ///
     /// # Errors
     /// The daemon refuses, or does not answer in time: within a minute, or 10 minutes where flash memory is written.

@@ -61,7 +61,7 @@ pub enum Content {
     },
     /// The answer.
     Answer(Numbered<Result<Answer, Refusal>>),
-    /// A client wants to drive a master.
+    /// A client requests a master, to drive it.
     Take {
         /// Number of the master.
         master: u32,
@@ -94,8 +94,8 @@ pub enum Content {
     },
     /// Known data of the segment after a scan, from an owner, in the bytes.
     Knowledge,
-    /// An owner gives the master back, and sends nothing any more. The bytes are what it knows; empty if that is
-    /// nothing.
+    /// An owner gives the master back, and sends nothing any more. The bytes are its knowledge; empty without
+    /// any.
     Release,
     /// The daemon drives the master again, after a release.
     Released,

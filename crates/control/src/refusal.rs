@@ -88,7 +88,7 @@ pub enum Refusal {
 pub enum ServiceFault {
     /// There is no SubDevice at this position.
     NoSubDevice,
-    /// The SubDevice has no mailbox, or does not know the protocol.
+    /// The SubDevice has no mailbox, or does not support the protocol.
     NoProtocol,
     /// The SubDevice has refused with this code: an abort code of an SDO, an error code of an IDN.
     Aborted(u32),

@@ -159,7 +159,7 @@ mod tests {
         assert_eq!(places(&relative).sockets(), all[1..]);
         std::fs::remove_dir_all(&of_system).expect("it is there");
         let taken = own.parent().expect("a directory");
-        std::fs::set_permissions(taken, std::fs::Permissions::from_mode(0o777)).expect("it is ours");
+        std::fs::set_permissions(taken, std::fs::Permissions::from_mode(0o777)).expect("it is writable");
         let refused = places(&nothing).listening().expect_err("all can write it");
         assert!(refused.ends_with(&format!("expected a directory of user {user} that no other user can write")));
         std::fs::remove_dir_all(directory).expect("it is there");
@@ -172,10 +172,10 @@ mod tests {
         let inner = directory.join("inner");
         std::fs::create_dir(&inner).expect("it can be made");
         for (mode, is_right) in [(0o700, true), (0o755, true), (0o770, false), (0o777, false)] {
-            std::fs::set_permissions(&inner, std::fs::Permissions::from_mode(mode)).expect("it is ours");
+            std::fs::set_permissions(&inner, std::fs::Permissions::from_mode(mode)).expect("it is writable");
             assert_eq!(is_private(&inner, user), is_right, "{mode:o}");
         }
-        std::fs::set_permissions(&inner, std::fs::Permissions::from_mode(0o700)).expect("it is ours");
+        std::fs::set_permissions(&inner, std::fs::Permissions::from_mode(0o700)).expect("it is writable");
         assert!(!is_private(&inner, user + 1));
         symlink(&inner, directory.join("link")).expect("it can be made");
         assert!(!is_private(&directory.join("link"), user) && !is_private(&directory.join("none"), user));

@@ -300,7 +300,7 @@ impl Board {
         self.ring.store(RingWord { changes, ..word }.pack(), Ordering::Release);
     }
 
-    /// State of the ring as the exchange sees it.
+    /// State of the ring in the exchange.
     pub fn ring(&self) -> RingWord {
         RingWord::unpack(self.ring.load(Ordering::Acquire))
     }

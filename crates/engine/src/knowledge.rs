@@ -1,4 +1,4 @@
-//! What a MainDevice knows of its segment, as plain data and as bytes: for another process that goes on with it.
+//! Knowledge of a MainDevice about its segment, as plain data and as bytes: for another process that goes on with it.
 //!
 //! Out: [`MainDevice::knowledge`](crate::main_device::MainDevice::knowledge) and [`Knowledge::to_bytes`]. In:
 //! [`Knowledge::from_bytes`] and [`MainDevice::resume`](crate::main_device::MainDevice::resume). The bytes have a
@@ -49,7 +49,7 @@ pub enum Handover {
     AfterCrash,
 }
 
-/// What a MainDevice knows of its segment.
+/// Knowledge of a MainDevice about its segment.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Knowledge {

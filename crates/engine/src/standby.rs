@@ -150,11 +150,6 @@ fn mark(frame: &mut [u8], link: Link) -> Result<(), NotForwarded> {
     Ok(())
 }
 
-/// Whether no INACTIVE MainDevice has forwarded a received frame yet: its first pass (protocol 9.8).
-pub fn is_first_pass(frame: &[u8]) -> bool {
-    frame.get(MARKS_AT).is_some_and(|marks| marks & (FORWARDED_ON_MAIN | FORWARDED_ON_REDUNDANT) == 0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -250,7 +245,7 @@ mod tests {
 
     // covers: SM-09
     #[test]
-    fn frames_of_a_maindevice_with_the_same_identity_are_told_and_forwarded() {
+    fn frames_of_a_maindevice_with_the_same_identity_are_counted_and_forwarded() {
         let late = NOW + OWN_FRAMES_COME_FOR + Duration::from_nanos(1);
         for (forwarder, now) in [(forwarder(), Instant(0)), (forwarder().after_sending(NOW), late)] {
             let onward = forwarder.forward(&mut own(OWN_REDUNDANT), Link::Redundant, BOTH, now);
@@ -258,12 +253,6 @@ mod tests {
             let foreign = forwarder.forward(&mut frame(0x02), Link::Redundant, BOTH, now);
             assert_eq!(foreign, Ok(Onward { link: Link::Main, has_own_identity: false }));
         }
-    }
-
-    #[test]
-    fn the_first_pass_has_neither_mark() {
-        assert!(is_first_pass(&frame(0x0A)) && !is_first_pass(&[]));
-        assert!([0x04, 0x80, 0x8E].iter().all(|marks| !is_first_pass(&frame(*marks))));
     }
 
     proptest! {

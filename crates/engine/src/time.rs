@@ -1,4 +1,4 @@
-//! Host time as the engine sees it: an argument, never read from a clock.
+//! Host time in the engine: an argument, never read from a clock.
 
 use core::ops::{Add, AddAssign, Sub};
 use core::time::Duration;

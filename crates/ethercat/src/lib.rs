@@ -1,5 +1,5 @@
 //! The command line tool `ethercat`: commands, options, output and exit codes as users of the IgH EtherCAT Master know
-//! them. It asks the daemon `ringcatd`, and through it the application that drives a segment.
+//! them. It sends its requests to the daemon `ringcatd`, and through it to the application that drives a segment.
 //!
 //! * [`arguments`]: options and words of the command line; [`numbers`]: numbers and lists of them;
 //! * [`shape`]: the description of a command; [`commands`]: all commands, also by abbreviation; [`help`]: their use;

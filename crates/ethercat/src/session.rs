@@ -116,7 +116,7 @@ impl<'a> Session<'a> {
         self.links.is_some()
     }
 
-    /// Asks about a master; `bytes` is data to write. Returns data that was read, too.
+    /// Sends a query about a master; `bytes` is data to write. Returns data that was read, too.
     ///
     /// # Errors
     /// The daemon refuses, or is not there.
@@ -135,7 +135,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Asks a question of the tool.
+    /// Sends a query of the tool.
     ///
     /// # Errors
     /// As [`Session::ask`].
@@ -146,7 +146,7 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Asks for something to be done, or for data.
+    /// Requests an action, or data.
     ///
     /// # Errors
     /// As [`Session::ask`].

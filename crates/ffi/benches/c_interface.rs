@@ -59,8 +59,8 @@ fn main() -> ExitCode {
     if met { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// A program that locks all its memory, its code included, at the usual limit of 8 MiB: it works, or is told which
-/// limit to set.
+/// A program that locks all its memory, its code included, at the usual limit of 8 MiB: it works, or gets a message
+/// which limit to set.
 fn locks_all(prefix: &Path) -> bool {
     let program = library::workshop().join("hosts-static");
     let mut cc = Command::new("cc");

@@ -38,7 +38,7 @@ impl Slot {
         }
     }
 
-    /// Receives the frames that have arrived, as [`Slot::use_now`], and sees whether the bus was taken back.
+    /// Receives the frames that have arrived, as [`Slot::use_now`], and checks whether the bus was taken back.
     ///
     /// # Errors
     /// As [`Slot::use_now`].

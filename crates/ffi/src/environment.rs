@@ -1,9 +1,9 @@
 //! Which links a master has: from variables of the environment.
 //!
 //! `RINGCAT_SOCKET` names the socket of a daemon, and comes first. Without it the library opens links itself that
-//! variables name; where none does, it asks the daemon in the usual places. Master 0 takes `RINGCAT_SIM` (a segment
-//! file that is simulated in this process), or `RINGCAT_MAIN` and `RINGCAT_REDUNDANT` (network interfaces); master 1
-//! takes `RINGCAT_SIM_1`, `RINGCAT_MAIN_1`, `RINGCAT_REDUNDANT_1`, and so on. `RINGCAT_SIM` comes before
+//! variables name; where none does, it connects to the daemon in the usual places. Master 0 takes `RINGCAT_SIM` (a
+//! segment file that is simulated in this process), or `RINGCAT_MAIN` and `RINGCAT_REDUNDANT` (network interfaces);
+//! master 1 takes `RINGCAT_SIM_1`, `RINGCAT_MAIN_1`, `RINGCAT_REDUNDANT_1`, and so on. `RINGCAT_SIM` comes before
 //! `RINGCAT_MAIN`.
 
 use std::path::{Path, PathBuf};

@@ -85,8 +85,8 @@ const ROOM: usize = 5 << 20;
 /// There is not; the text names the limit to set.
 pub fn check_memory() -> Result<(), String> {
     let flags = libc::MAP_PRIVATE | libc::MAP_ANONYMOUS | libc::MAP_NORESERVE;
-    // SAFETY: a new mapping that nothing can access, and that nothing but the next call knows. With locked memory the
-    // kernel counts it against the limit.
+    // SAFETY: a new mapping that nothing can access, and that only the next call has the address of. With locked memory
+    // the kernel counts it against the limit.
     unsafe {
         let place = libc::mmap(std::ptr::null_mut(), ROOM, libc::PROT_NONE, flags, -1, 0);
         if place == libc::MAP_FAILED {

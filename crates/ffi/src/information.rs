@@ -1,4 +1,4 @@
-//! What a program asks about the bus and its SubDevices.
+//! What a program reads about the bus and its SubDevices.
 
 use std::ffi::c_char;
 

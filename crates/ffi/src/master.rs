@@ -389,7 +389,7 @@ impl Master {
     }
 
     /// State of all SubDevices, or of those on one link. Loads words while the application of this handle is active;
-    /// before, it asks the SubDevices.
+    /// before, it reads the SubDevices.
     ///
     /// # Errors
     /// The handle was released; another thread activates or deactivates it; the bus has one link only.

@@ -51,7 +51,7 @@ pub struct Area {
 /// Reads a file.
 ///
 /// # Errors
-/// It cannot be read, or its content is wrong; the operator is told what is wrong, and in which line.
+/// It cannot be read, or its content is wrong; a message to the operator says what is wrong, and in which line.
 pub fn load(path: &str) -> Outcome<LoadedNetwork> {
     LoadedNetwork::load(Path::new(path)).map_err(|error| {
         report(format_args!("{error}"));

@@ -65,24 +65,24 @@ impl DaemonResponder {
             let text = format!("expected at most {MOST_DATA} bytes of data, got {}", bytes.len());
             return Err(Refusal::Service { fault: ServiceFault::TooLong, text });
         }
-        let told = |error: ClientError| match error {
+        let failure = |error: ClientError| match error {
             ClientError::Refused(refusal) => refusal,
             error => Refusal::Failed(error.to_string()),
         };
         // A daemon that was started anew, or has ended an idle connection, is connected to again.
         let idle = locked(&self.idle).pop().filter(Client::is_open);
         let client = idle.map_or_else(|| Client::connect(&self.socket, &program_name()), Ok);
-        let mut client = client.map_err(told)?;
+        let mut client = client.map_err(failure)?;
         let answered = client.ask_patiently(self.master, what, bytes);
         if matches!(answered, Ok(_) | Err(ClientError::Refused(_))) {
             locked(&self.idle).push(client);
         }
-        answered.map_err(told)
+        answered.map_err(failure)
     }
 }
 
 impl Responder {
-    /// Asks, and waits for the answer. `bytes` is data to write; with the answer comes data that was read.
+    /// Sends a query, and waits for the answer. `bytes` is data to write; with the answer comes data that was read.
     ///
     /// # Errors
     /// What [`code_of`] turns into a return code.

@@ -1,5 +1,5 @@
-//! The mailbox gateway: programs on this host or in the network talk to SubDevices through the MainDevice's mailboxes
-//! (protocol 10.1, ETG.8200), over UDP and TCP at once.
+//! The mailbox gateway: programs on this host or in the network exchange mail with SubDevices through the MainDevice's
+//! mailboxes (protocol 10.1, ETG.8200), over UDP and TCP at once.
 //!
 //! A thread of its own serves the sockets ([`Gateway`]); messages pass to the engine's thread and answers back through
 //! bounded queues ([`Passage`]). Which message may pass, and which client has its turn, is decided in the engine

@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_permission_to_switch_an_interface_is_told_with_the_setcap_line() {
+    fn a_missing_permission_to_switch_an_interface_is_reported_with_the_setcap_line() {
         let text = LinkError::MayNotSwitch { name: "eth0".to_owned() }.to_string();
         assert!(text.starts_with("not permitted to switch eth0") && text.contains("cap_net_admin"), "{text}");
     }

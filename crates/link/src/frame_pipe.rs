@@ -186,7 +186,7 @@ mod tests {
 
     // covers: links
     #[test]
-    fn a_closed_end_ends_no_wait_and_is_told_after_the_last_frame() {
+    fn a_closed_end_ends_no_wait_and_is_reported_after_the_last_frame() {
         let (mut near, mut far) = FramePipe::pair().expect("there are descriptors");
         assert!(near.send(&[1; 60]));
         drop(near);

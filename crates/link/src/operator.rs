@@ -52,9 +52,9 @@ impl OperatorLines {
     pub fn write(&self, priority: Priority, text: &str) {
         self.to_the_journal(priority, text);
         let lost = self.lost.swap(0, Ordering::AcqRel);
-        let told = lost == 0 || self.write_now(&self.line(Priority::Warning, &lost_lines(lost)));
-        if !told || !self.write_now(&self.line(priority, text)) {
-            let more = if told { 1 } else { lost + 1 };
+        let is_written = lost == 0 || self.write_now(&self.line(Priority::Warning, &lost_lines(lost)));
+        if !is_written || !self.write_now(&self.line(priority, text)) {
+            let more = if is_written { 1 } else { lost + 1 };
             self.lost.fetch_add(more, Ordering::AcqRel);
         }
     }

@@ -45,8 +45,8 @@ pub struct PacketOptions {
     /// Whether the interface accepts all frames. If not, it accepts broadcast, its own address and [`GROUP_ADDRESS`].
     pub promiscuous: bool,
     /// Whether frames keep their VLAN tag. If false, the tag is missing: the kernel removes it before it looks for
-    /// sockets of one EtherType. If true, the socket sees all frames before that step, and each EtherCAT frame counts
-    /// as dropped in the statistics of the interface.
+    /// sockets of one EtherType. If true, the socket receives all frames before that step, and each EtherCAT frame
+    /// counts as dropped in the statistics of the interface.
     pub keep_vlan_tags: bool,
 }
 

@@ -75,10 +75,10 @@ mod tests {
         let path = directory.join("file");
         open(&path).expect("it can be made");
         assert_eq!(mode(&path), 0o600);
-        fs::write(&path, "kept").expect("it is ours");
+        fs::write(&path, "kept").expect("it is writable");
         // As an earlier version has left it.
-        fs::set_permissions(&path, Permissions::from_mode(0o644)).expect("it is ours");
-        open(&path).expect("it is ours");
+        fs::set_permissions(&path, Permissions::from_mode(0o644)).expect("it is writable");
+        open(&path).expect("it is writable");
         assert_eq!((mode(&path), fs::read_to_string(&path).expect("it is there")), (0o600, "kept".to_owned()));
         fs::remove_dir_all(directory).expect("it is there");
     }
@@ -87,21 +87,21 @@ mod tests {
     #[test]
     fn links_and_what_is_no_file_are_refused_and_stay_as_they_are() {
         let directory = directory("links");
-        let (victim, path) = (directory.join("victim"), directory.join("file"));
-        fs::write(&victim, "precious").expect("it is ours");
-        symlink(&victim, &path).expect("it can be made");
+        let (target, path) = (directory.join("target"), directory.join("file"));
+        fs::write(&target, "precious").expect("it is writable");
+        symlink(&target, &path).expect("it can be made");
         assert!(open(&path).expect_err("it is a link").to_string().contains("symbolic link"));
         fs::remove_file(&path).expect("it is there");
         symlink(directory.join("nothing"), &path).expect("it can be made");
         assert!(open(&path).is_err() && !directory.join("nothing").exists(), "nothing is made behind a link");
         fs::remove_file(&path).expect("it is there");
-        fs::hard_link(&victim, &path).expect("it can be made");
+        fs::hard_link(&target, &path).expect("it can be made");
         assert!(open(&path).expect_err("it has two names").to_string().contains("hard links"));
         fs::remove_file(&path).expect("it is there");
         let made = Command::new("mkfifo").arg(&path).status();
         assert!(made.is_ok_and(|status| status.success()));
         assert!(open(&path).expect_err("it is a pipe").to_string().contains("something else"));
-        assert_eq!(fs::read(&victim).expect("it is there"), b"precious");
+        assert_eq!(fs::read(&target).expect("it is there"), b"precious");
         fs::remove_dir_all(directory).expect("it is there");
     }
 

@@ -45,8 +45,8 @@ impl Peer {
         let mut length = size_of_val(groups.as_slice()) as libc::socklen_t;
         let pointer = groups.as_mut_ptr().cast();
         // SAFETY: pointer and length describe live integers.
-        let told = unsafe { libc::getsockopt(fd, libc::SOL_SOCKET, libc::SO_PEERGROUPS, pointer, &mut length) };
-        groups.truncate(if told < 0 { 0 } else { length as usize / size_of::<u32>() });
+        let result = unsafe { libc::getsockopt(fd, libc::SOL_SOCKET, libc::SO_PEERGROUPS, pointer, &mut length) };
+        groups.truncate(if result < 0 { 0 } else { length as usize / size_of::<u32>() });
         groups.insert(0, own.gid);
         Ok(Peer { pid: u32::try_from(own.pid).unwrap_or(0), uid: own.uid, groups })
     }
@@ -83,9 +83,9 @@ pub fn watch_peer(stream: &UnixStream, peer: &Peer) -> io::Result<Option<OwnedFd
     let mut length = size_of::<libc::c_int>() as libc::socklen_t;
     let pointer = std::ptr::from_mut(&mut fd).cast();
     // SAFETY: pointer and length describe a live integer.
-    let told =
+    let result =
         unsafe { libc::getsockopt(stream.as_raw_fd(), libc::SOL_SOCKET, kernel::SO_PEERPIDFD, pointer, &mut length) };
-    if told == 0 && fd >= 0 {
+    if result == 0 && fd >= 0 {
         // SAFETY: the descriptor was just made and has no other owner.
         return Ok(Some(unsafe { OwnedFd::from_raw_fd(fd) }));
     }

@@ -310,7 +310,7 @@ mod tests {
 
     // covers: capture
     #[test]
-    fn a_sniffer_sees_sent_frames_times_and_the_beginning_of_long_frames() {
+    fn a_sniffer_gets_sent_frames_times_and_the_beginning_of_long_frames() {
         let mut long = slot(&FRAME, 0xe005, PACKET_OUTGOING);
         long[4..8].copy_from_slice(&9000u32.to_ne_bytes());
         long[16..20].copy_from_slice(&5u32.to_ne_bytes());

@@ -1,8 +1,8 @@
 //! Ends the wait of a thread: by another thread, or by data at a descriptor.
 //!
-//! Output: a [`Waker`], for any thread; its use costs one system call. The waiting thread sees it in the same `ppoll`
-//! as its sockets ([`crate::waiting::wait_or_wake`]). A wake-up that comes before the wait ends it at once. New data at
-//! a watched descriptor ends one wait; what was not read then ends no further wait.
+//! Output: a [`Waker`], for any thread; its use costs one system call. The waiting thread receives it in the same
+//! `ppoll` as its sockets ([`crate::waiting::wait_or_wake`]). A wake-up that comes before the wait ends it at once. New
+//! data at a watched descriptor ends one wait; what was not read then ends no further wait.
 
 use std::os::fd::{AsFd, AsRawFd, OwnedFd, RawFd};
 use std::sync::Arc;

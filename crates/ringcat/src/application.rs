@@ -114,7 +114,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     #[inline(always)]
     fn wait_for_only_frame<P: CycleProbe>(&mut self, probe: &mut P) -> Option<(Instant, Instant)> {
         let Application { links, cyclic, acyclic, .. } = self;
-        if !cyclic.exchange.awaits_only_frame() || !links.knows_arrivals() {
+        if !cyclic.exchange.awaits_only_frame() || !links.has_arrival_times() {
             return None;
         }
         let left_at = cyclic.left_at()?;

@@ -206,12 +206,12 @@ impl CyclicStatus {
         set(received, counters.received);
     }
 
-    /// Wants a snapshot ([`crate::observer`]).
+    /// Requests a snapshot ([`crate::observer`]).
     pub(crate) fn want_snapshot(&self) {
         self.wanted.fetch_or(SNAPSHOT, Ordering::Release);
     }
 
-    /// Whether a reader wants anything.
+    /// Whether a reader has requested anything.
     #[inline(always)]
     pub(crate) fn is_any_wanted(&self) -> bool {
         self.wanted.load(Ordering::Relaxed) != 0

@@ -53,8 +53,8 @@ impl<A: Links, B: Links> Links for EitherLinks<A, B> {
         either!(self, links => links.has_frame())
     }
 
-    fn knows_arrivals(&self) -> bool {
-        either!(self, links => links.knows_arrivals())
+    fn has_arrival_times(&self) -> bool {
+        either!(self, links => links.has_arrival_times())
     }
 
     #[inline(always)]

@@ -1,4 +1,4 @@
-//! Another MainDevice on the links: heard before anything is sent.
+//! Another MainDevice on the links: detected before anything is sent.
 //!
 //! Two MainDevices on one segment disturb each other: a scan brings all SubDevices to INIT, and reading a register such
 //! as 0x0110 clears what the other one waits for.

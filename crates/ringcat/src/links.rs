@@ -31,7 +31,7 @@ impl<T> PerLink<T> {
 pub struct Arrived<'a> {
     /// The link on which it came.
     pub link: Link,
-    /// When it arrived at the interface, or when it was taken if these links do not know that.
+    /// When it arrived at the interface, or when it was taken if these links do not record that.
     pub at: Instant,
     /// The frame, which may be changed.
     pub frame: &'a mut [u8],
@@ -46,7 +46,7 @@ impl<'a> Arrived<'a> {
 
 /// Links while a frame of them is held: they send it on.
 pub trait SendOn {
-    /// Whether a link has a carrier, as far as these links know.
+    /// Whether a link has a carrier, if these links report it.
     fn is_up(&self, link: Link) -> bool;
 
     /// Sends a frame, without FCS. False if it certainly does not leave.
@@ -96,11 +96,11 @@ pub trait Links {
     }
 
     /// Whether [`Links::received_at`] returns times, also if it is called later, before the next frame is taken.
-    fn knows_arrivals(&self) -> bool {
+    fn has_arrival_times(&self) -> bool {
         false
     }
 
-    /// Arrival time at the interface of the frame that was last passed to `take`; `None` if these links know only the
+    /// Arrival time at the interface of the frame that was last passed to `take`; `None` if these links record only the
     /// time at which it was taken. The frame left at `sent_at`, and was taken at about `now`: a time that is not
     /// between them is determined again. Without a system call.
     fn received_at(&mut self, _sent_at: Instant, _now: Instant) -> Option<Instant> {

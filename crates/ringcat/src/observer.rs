@@ -135,7 +135,7 @@ impl fmt::Display for NoSnapshot {
 impl std::error::Error for NoSnapshot {}
 
 impl Observer {
-    /// Sees what a cyclic half fills.
+    /// Reads what a cyclic half fills.
     pub(crate) fn new(observed: Arc<Observed>) -> Observer {
         Observer(observed)
     }

@@ -1,4 +1,4 @@
-//! One MainDevice of two in a ring: what it does with frames of the other one (protocol 9.7, 9.8).
+//! One of two MainDevices in a ring: processing of the frames of the other one (protocol 9.7, 9.8).
 //!
 //! As INACTIVE each received frame is taken and filled, sent on at the other link, and then read for its outputs.
 //! Nothing here waits, allocates or locks.
@@ -18,7 +18,7 @@ const MAX_AGE_CYCLES: u32 = 2;
 /// Frames up to this age are forwarded however short the cycle is: threads are late now and then.
 const LEAST_AGE: Duration = Duration::from_millis(1);
 
-/// A MainDevice of two, or one that is alone.
+/// One of two MainDevices, or a single one.
 #[derive(Debug, Default)]
 pub(crate) struct OfTwo {
     pub forwarder: Option<StoreAndForward>,

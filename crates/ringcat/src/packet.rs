@@ -213,7 +213,7 @@ impl PacketLinks {
         self
     }
 
-    /// What another process must know to go on with the sockets, beside duplicates of their descriptors.
+    /// What another process needs to continue with the sockets, beside duplicates of their descriptors.
     pub fn handed(&self) -> PerLink<HandedSocket> {
         PerLink::new(self.main.handed(), self.redundant.as_ref().map(PacketSocket::handed))
     }
@@ -327,7 +327,7 @@ impl Links for PacketLinks {
         self.main.has_frame() || self.redundant.as_ref().is_some_and(PacketSocket::has_frame)
     }
 
-    fn knows_arrivals(&self) -> bool {
+    fn has_arrival_times(&self) -> bool {
         true
     }
 

@@ -40,7 +40,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.probed(&mut ()).receive_until(until)
     }
 
-    /// Whether the acyclic half asks for an empty wire now, to measure the delays of clocks
+    /// Whether the acyclic half requests an empty wire now, to measure the delays of clocks
     /// ([`ClockConfig::pauses`](crate::ClockConfig)): the application then leaves out [`Application::send`] in this
     /// cycle. For an application with its own loop, whose frames are on the wire until it receives again.
     pub fn pauses(&mut self) -> bool {

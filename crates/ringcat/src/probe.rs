@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn two_probes_together_want_what_either_wants() {
+    fn two_probes_together_need_what_either_needs() {
         type Both = (JobProbe, FramesIn<fn(Instant)>);
         const {
             assert!(Both::TIMES_JOBS && Both::AWAITS_FRAMES);

@@ -54,7 +54,7 @@ pub(crate) trait Reads {
     /// The same after it was sent on.
     fn after(&mut self, _frame: &[u8]) {}
 
-    /// Whether a link has a carrier, as far as this knows.
+    /// Whether a link has a carrier, if this object reports it.
     fn is_up(&self, _link: Link) -> bool {
         true
     }

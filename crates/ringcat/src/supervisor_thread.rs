@@ -460,7 +460,7 @@ impl AcyclicHalf for SupervisorThread {
     }
 }
 
-/// What is left of an application of two threads that has ended or was refused: another one may be activated with both.
+/// The rest of an application with two threads that has ended or was refused: another one may be activated with both.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct Ended<L> {

@@ -22,7 +22,7 @@ impl Words {
     pub fn write(&self, fill: impl FnOnce(&[AtomicU64])) {
         let number = self.number.load(Ordering::Relaxed);
         self.number.store(number + 1, Ordering::Relaxed);
-        // No word is stored before the odd number: a reader that sees a new word sees that number, too.
+        // No word is stored before the odd number: a reader that reads a new word reads that number, too.
         fence(Ordering::Release);
         fill(&self.words);
         self.number.store(number + 2, Ordering::Release);

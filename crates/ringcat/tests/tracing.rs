@@ -1,4 +1,5 @@
-//! What an application's subscriber sees of the acyclic half: in a program of its own, since there is one subscriber.
+//! What an application's subscriber receives from the acyclic half: in a program of its own, since there is one
+//! subscriber.
 
 use std::error::Error;
 use std::fmt::Debug;

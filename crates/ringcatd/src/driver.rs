@@ -9,7 +9,7 @@ use crate::driving::Driving;
 use crate::opened::Opened;
 use crate::owner::OwnerLink;
 
-/// Longest wait of an application that asks for a master while it passes from another process to the daemon. That takes
+/// Longest wait of an application that requests a master while it passes from another process to the daemon. That takes
 /// milliseconds, and longer on a busy machine.
 pub const CHANGE: Duration = Duration::from_secs(5);
 

@@ -142,7 +142,7 @@ impl Driving {
 /// Waits until no SubDevice changes its state any more, and until the PDOs of dictionaries are read that are about to
 /// be: after the end of an application, or when they have just got power, they are on their way to PREOP, and this is
 /// not interrupted. An application reaches OP without this wait, since its activation continues from the present state
-/// of each SubDevice; one that asks for mailboxes first finds them in use.
+/// of each SubDevice; one that requests mailboxes first finds them in use.
 fn wait_until_settled(supervisor: &SupervisorThread) {
     let settled = AlState::PreOp.code();
     let (begin, mut last, mut since) = (Instant::now(), 0, Instant::now());

@@ -183,7 +183,7 @@ impl Drop for Listening {
         self.is_over.store(true, Ordering::Release);
         // Another file may be at its place.
         if inode(&self.path).is_ok_and(|there| there == self.inode) {
-            // The thread that accepts clients sees the end by another one.
+            // The thread that accepts clients detects the end by another one.
             let _ = UnixStream::connect(&self.path);
             let _ = std::fs::remove_file(&self.path);
         }

@@ -287,7 +287,7 @@ impl Master {
         opened.switch(usize::from(is_redundant), up)
     }
 
-    /// Keeps what an owner knows, for the case that it crashes. False if it cannot be read and is not kept.
+    /// Keeps the knowledge of an owner, in case it crashes. False if it cannot be read and is not kept.
     pub fn keep(&self, knowledge: Vec<u8>) -> bool {
         let is_usable = Knowledge::from_bytes(&knowledge).is_ok();
         if is_usable {
@@ -303,8 +303,8 @@ impl Master {
         if let Driver::Owner(owner, _) = self.driver.set(fault) {
             owner.end();
             // It may have ended.
-            let told = Content::TakenBack { cause: cause.to_owned() };
-            let _ = owner.connection().send_within(&told.into(), TELL);
+            let content = Content::TakenBack { cause: cause.to_owned() };
+            let _ = owner.connection().send_within(&content.into(), TELL);
         }
     }
 
@@ -463,10 +463,10 @@ mod tests {
         assert!(matches!(owner.ask(Query::State, Vec::new()), Err(Refusal::Changing { .. })));
         let fault = master.state().fault.expect("nothing drives it");
         assert_eq!(fault, FAILED);
-        let told = far.receive_with_descriptors(Limits::OWNER, None).expect("the links were sent").0.content;
-        assert!(matches!(told, Content::Taken(_)), "{told:?}");
-        let told = far.receive(Limits::OWNER, None).expect("it is told");
-        assert_eq!(told, Content::TakenBack { cause: FAILED.to_owned() }.into());
+        let content = far.receive_with_descriptors(Limits::OWNER, None).expect("the links were sent").0.content;
+        assert!(matches!(content, Content::Taken(_)), "{content:?}");
+        let content = far.receive(Limits::OWNER, None).expect("it gets a message");
+        assert_eq!(content, Content::TakenBack { cause: FAILED.to_owned() }.into());
         master.supervise();
         assert_eq!((master.state().fault, master.state().owner), (None, None));
         master.hand_over(&owner).expect("the daemon drives it").end(End::Ended);

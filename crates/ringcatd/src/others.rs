@@ -18,14 +18,14 @@ pub struct Others {
     master: u32,
     listened: Arc<Listened>,
     /// One was reported to the operator.
-    is_told: AtomicBool,
+    is_reported: AtomicBool,
 }
 
 impl Others {
     /// No other MainDevice is known. A segment that is not shared has none.
     pub fn new(master: u32, is_shared: bool) -> Others {
         let listened = Arc::new(if is_shared { Listened::default() } else { Listened::not_shared() });
-        Others { master, listened, is_told: AtomicBool::new(false) }
+        Others { master, listened, is_reported: AtomicBool::new(false) }
     }
 
     /// For links that listen.
@@ -72,7 +72,7 @@ impl Others {
     /// Reports once that another MainDevice drives the segment, and once that it no longer does.
     pub fn tell(&self) {
         let (master, cause) = (self.master, self.cause());
-        if self.is_told.swap(cause.is_some(), Ordering::AcqRel) != cause.is_some() {
+        if self.is_reported.swap(cause.is_some(), Ordering::AcqRel) != cause.is_some() {
             match cause {
                 Some(cause) => say(format_args!("master {master} is not driven: {cause}")),
                 None => say(format_args!("master {master}: the other MainDevice is silent")),

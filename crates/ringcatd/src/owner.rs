@@ -1,4 +1,4 @@
-//! An application that drives a master, as the daemon sees it: questions to it, and their answers.
+//! An application that drives a master, on the side of the daemon: questions to it, and their answers.
 //!
 //! What an owner has not answered yet is bounded in number and in bytes, so a message to it always finds room in the
 //! socket, and an owner that is stopped costs each client one second at most. Further questions wait for a place.
@@ -100,7 +100,7 @@ impl OwnerLink {
         self.questions.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Asks, and waits for the answer: a second for a sign, longer for the result of what it has begun.
+    /// Sends a query, and waits for the answer: a second for a sign, longer for the result of what it has begun.
     ///
     /// # Errors
     /// The owner refuses, is silent, or has ended.

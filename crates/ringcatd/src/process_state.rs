@@ -1,8 +1,8 @@
-//! What the kernel tells of the process of an owner before its end shows elsewhere.
+//! What the kernel reports about the process of an owner before its end is detected elsewhere.
 //!
 //! The end of a stream and a pidfd wait until the memory of a process is torn down, and until its core is written. The
-//! flags of the process tell at once that a signal ends it (`PF_SIGNALED`, `PF_DUMPCORE` of `linux/sched.h`, field 9 of
-//! `/proc/PID/stat`). A heartbeat could not tell a process that ends from one that waits for a processor.
+//! flags of the process show at once that a signal ends it (`PF_SIGNALED`, `PF_DUMPCORE` of `linux/sched.h`, field 9 of
+//! `/proc/PID/stat`). A heartbeat could not distinguish a process that ends from one that waits for a processor.
 
 use std::fs::File;
 use std::io::{self, Read, Seek};
@@ -36,7 +36,7 @@ impl ProcessFile {
         Ok(ProcessFile(File::open(format!("/proc/{pid}/stat"))?))
     }
 
-    /// Its state now; [`ProcessState::Ends`] when it is gone, `None` if the kernel tells something else.
+    /// Its state now; [`ProcessState::Ends`] when it is gone, `None` if the kernel reports another state.
     pub fn look(&mut self) -> Option<ProcessState> {
         let mut bytes = [0; LONGEST];
         let read = self.0.rewind().and_then(|()| self.0.read(&mut bytes));

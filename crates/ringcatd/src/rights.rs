@@ -130,8 +130,8 @@ mod tests {
     #[test]
     fn a_mode_says_for_user_group_and_others_what_they_may() {
         use Right::{Change, Read};
-        let (root, user, stranger) = (peer(0, &[0]), effective_user(), effective_user() + 1);
-        let (own, member, other) = (peer(user, &[7]), peer(stranger, &[7, 44]), peer(stranger, &[7, 45]));
+        let (root, user, other_user) = (peer(0, &[0]), effective_user(), effective_user() + 1);
+        let (own, member, other) = (peer(user, &[7]), peer(other_user, &[7, 44]), peer(other_user, &[7, 45]));
         let cases = [
             (0o660, Some(Change), None, 0o660),
             (0o664, Some(Change), Some(Read), 0o666),

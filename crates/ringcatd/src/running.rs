@@ -77,7 +77,7 @@ pub fn run(setup: &Setup) -> Result<(), String> {
     Ok(())
 }
 
-/// The daemon of one command ends with that command, however that ends: only the command knows its socket.
+/// The daemon of one command ends with that command, however that ends: only the command has the path of its socket.
 fn end_with_input() -> Result<(), String> {
     let body = || {
         let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());

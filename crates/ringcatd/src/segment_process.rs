@@ -78,7 +78,7 @@ pub fn greeting(control: &UnixStream) -> Result<bool, String> {
 /// Body of the process: simulates the segment of this file until the daemon and all drivers are gone.
 ///
 /// # Errors
-/// What is wrong, for the operator; the daemon was told.
+/// What is wrong, for the operator; the daemon has got it.
 pub fn run(file: &Path) -> Result<(), String> {
     // The daemon waits for its signals; the segment ends by them.
     unblock();

@@ -127,8 +127,8 @@ fn own(masters: &Masters, master: &Master, owner: OwnerLink, signs: Signs) -> Re
     let Ended { how, is_release, why } = tenure::serve(master, &owner, signs, masters.stop_limit);
     tenancy.end(how);
     say(format_args!("master {}: driven by ringcatd again, {} does not: {why}", master.number(), owner.owner()));
-    let told = if is_release { Content::Released } else { Content::TakenBack { cause: why.to_owned() } };
-    reply(owner.connection(), told.into());
+    let content = if is_release { Content::Released } else { Content::TakenBack { cause: why.to_owned() } };
+    reply(owner.connection(), content.into());
     master.prepare();
     Ok(())
 }

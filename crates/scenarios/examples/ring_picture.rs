@@ -94,7 +94,7 @@ fn disturb(application: &mut Application<SimulatedSegment>, stretch: usize) {
     }
 }
 
-/// Left edge, width of a cycle, and begin of each part, in pixels.
+/// Left edge, width of a cycle, and start of each part, in pixels.
 const LEFT: f64 = 150.0;
 const STEP: f64 = 16.0;
 const WIDTH: f64 = LEFT + STEP * (CYCLES[0] + CYCLES[1] + CYCLES[2]) as f64 + 30.0;

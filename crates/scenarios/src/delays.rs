@@ -2,7 +2,7 @@
 //!
 //! A run brings a random segment to a state with known delays, cuts and repairs its cables, and checks every written
 //! delay in every cycle. The true delays follow from the times at which the processing units received one frame, which
-//! only the simulator knows. A delay is right, or it is not written and a reason is reported ([`Outcome`]).
+//! only the simulator has. A delay is right, or it is not written and a reason is reported ([`Outcome`]).
 
 use std::collections::BTreeMap;
 use std::time::Duration;

@@ -1,6 +1,6 @@
 //! Requests to a device with all mailbox protocols; each response identifies its request.
 //!
-//! A [`Requester`] writes a unique value, reads it back, and knows the possible values: the last written one, and after
+//! A [`Requester`] writes a unique value, reads it back, and keeps the possible values: the last written one, and after
 //! failed writes their possible remains. Any other value is the response to another or an older request, and panics.
 
 use std::net::Ipv4Addr;

@@ -86,7 +86,7 @@ impl Pair {
         self.start(host, Phase::Inactive, programs::standby_without_limit);
     }
 
-    /// Starts the program of a MainDevice of two on a host: it listens, and follows or becomes ACTIVE.
+    /// Starts the program of one of two MainDevices on a host: it listens, and follows or becomes ACTIVE.
     pub fn start_member(&mut self, host: Host) {
         self.start(host, Phase::Inactive, member::member);
     }
@@ -124,7 +124,7 @@ impl Pair {
         panic!("{active:?} is not ACTIVE with a standby that is ready within {SETTLE_LIMIT} cycles");
     }
 
-    /// Asks the program of a host to request a role.
+    /// Makes the program of a host request a role.
     pub fn request(&mut self, host: Host, request: RoleRequest) {
         self.say(format!("{host:?}: {request:?}"));
         self.boards[host as usize].ask_for(request);
@@ -143,7 +143,7 @@ impl Pair {
         started.unwrap_or_else(|error| panic!("a program cannot be started: {error}"));
     }
 
-    /// Asks the ACTIVE program of a host to stop in order: SubDevices go to INIT, links go down.
+    /// Makes the ACTIVE program of a host stop in order: SubDevices go to INIT, links go down.
     pub fn stop(&mut self, host: Host) {
         self.say(format!("{host:?} is to stop"));
         self.boards[host as usize].ask_to_stop();
@@ -194,7 +194,7 @@ impl Pair {
         self.seen(host).incomplete
     }
 
-    /// The ring as the ACTIVE on a host sees it.
+    /// State of the ring in the ACTIVE on a host.
     pub fn ring(&self, host: Host) -> RingState {
         self.seen(host).ring
     }

@@ -11,9 +11,9 @@ pub const fn sends_again(seed: u64) -> bool {
     Dice::new(seed ^ 0x00A1_0000).one_in(3)
 }
 
-/// Whether the links of a seed's scenario know when frames arrived, as packet sockets do, so that cycles of one frame
+/// Whether the links of a seed's scenario record when frames arrive, as packet sockets do, so that cycles of one frame
 /// take their fast path: one in two.
-pub const fn knows_arrivals(seed: u64) -> bool {
+pub const fn has_arrival_times(seed: u64) -> bool {
     Dice::new(seed ^ 0x00A2_0000).one_in(2)
 }
 

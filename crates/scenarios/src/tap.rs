@@ -70,7 +70,7 @@ pub struct Tap {
     /// Other copies that came back after a further try of their cycle had been sent.
     superseded: u64,
     /// Whether the arrival of the frame that was taken last is known, as with packet sockets.
-    knows_arrivals: bool,
+    has_arrival_times: bool,
     /// When the last frame was taken.
     taken_at: Instant,
     /// Whether links can be taken down.
@@ -104,7 +104,7 @@ impl Tap {
             departed: Vec::new(),
             outdated: 0,
             superseded: 0,
-            knows_arrivals: false,
+            has_arrival_times: false,
             taken_at: Instant::default(),
             can_disconnect: true,
             losses: Vec::new(),
@@ -153,9 +153,9 @@ impl Tap {
         self.losses.iter().map(|loss| loss.count).sum()
     }
 
-    /// From now on the links know when frames arrived, as packet sockets do: cycles of one frame take their fast path.
+    /// From now on the links record when frames arrive, as packet sockets do: cycles of one frame take their fast path.
     pub fn know_arrivals(&mut self) {
-        self.knows_arrivals = true;
+        self.has_arrival_times = true;
     }
 
     /// From now on links cannot be taken down.
@@ -334,12 +334,12 @@ impl Links for Tap {
         any
     }
 
-    fn knows_arrivals(&self) -> bool {
-        self.knows_arrivals
+    fn has_arrival_times(&self) -> bool {
+        self.has_arrival_times
     }
 
     fn received_at(&mut self, _sent_at: Instant, _now: Instant) -> Option<Instant> {
-        self.knows_arrivals.then_some(self.taken_at)
+        self.has_arrival_times.then_some(self.taken_at)
     }
 
     fn carrier(&self, link: Link) -> Option<bool> {

@@ -115,7 +115,7 @@ impl World {
             devices.for_each(|device| network.device_mut(device).controller.log_logical());
         }
         let mut tap = Tap::new(network);
-        if seeds::knows_arrivals(seed) {
+        if seeds::has_arrival_times(seed) {
             tap.know_arrivals();
         }
         tap.set_limit(tap.now() + SCAN_LIMIT);

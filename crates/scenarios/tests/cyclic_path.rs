@@ -56,7 +56,7 @@ fn counted(work: impl FnOnce()) -> (u64, u64) {
 
 // covers: no-allocation
 #[test]
-fn the_counter_sees_an_allocation() {
+fn the_counter_counts_an_allocation() {
     assert_eq!(counted(|| drop(std::hint::black_box(vec![1u8; 100]))), (1, 1));
 }
 
@@ -251,7 +251,7 @@ fn requests_do_not_allocate_in_the_cyclic_thread() {
     assert_eq!(used, (0, 0));
 }
 
-/// Links that know what memory they use themselves.
+/// Links that report their own memory.
 struct Apart {
     links: SharedSegment,
     own: Cell<(u64, u64)>,
@@ -398,7 +398,7 @@ fn copy_first(links: &mut MemoryLinks, first: &mut [u8; 1514]) -> (Link, usize) 
 // covers: eni-run
 #[test]
 fn the_image_of_an_eni_does_not_allocate_in_a_cycle() {
-    let file = EniFile::from_bytes(include_bytes!("../../ringcat/examples/machine.eni.xml")).expect("it is ours");
+    let file = EniFile::from_bytes(include_bytes!("../../ringcat/examples/machine.eni.xml")).expect("it is writable");
     let segment = SimulatedSegment::new(file.simulated(false).expect("cables fit"));
     let mut main_device = ringcat::MainDevice::request(segment, &ringcat::Options::default());
     main_device.scan().expect("a scan");

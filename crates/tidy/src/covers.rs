@@ -123,7 +123,7 @@ mod tests {
     use super::*;
 
     fn tree(source: &str) -> Tree {
-        let page = "## 7.1 Delays\n| CR-12 | told once |\n";
+        let page = "## 7.1 Delays\n| CR-12 | reported once |\n";
         let files = vec![File::new("docs/protocol/a.md", page), File::new("crates/a/src/b.rs", source)];
         Tree { files }
     }

@@ -76,7 +76,7 @@ const RULES: &[CrateRule] = &[
     },
     CrateRule {
         directory: "ringcatd",
-        // Its tests tell frames of both classes apart by the engine.
+        // Its tests distinguish frames of both classes by the engine.
         internal: Internal::Only(&["ringcat", "ringcat-control", "ringcat-engine", "ringcat-link"]),
         external: External::Only(&["clap"]),
     },

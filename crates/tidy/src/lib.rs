@@ -27,7 +27,8 @@
 //! * [`words`]: words for people in place of devices.
 //!
 //! The last three count ([`rules`]); `known.toml` lists known violations and only shrinks ([`known`]). `cargo run -p
-//! tidy` prints them, with the longest chain of files of each crate, `-- figures` figures and bars ([`bars`]).
+//! tidy` prints them, with the longest chain of files of each crate, `-- figures` figures and bars ([`bars`]), with the
+//! lines of the engine by module and capability ([`engine_lines`]).
 //! [`coverage`] lists the parts of the protocol without a test.
 //!
 //! [`tokens`] is a small Rust lexer for some of the modules, so that words in comments and strings are not read as
@@ -43,6 +44,7 @@ pub mod crates;
 pub mod decisions;
 pub mod deny;
 pub mod dependencies;
+pub mod engine_lines;
 pub mod errors;
 pub mod evidence;
 pub mod explorers;

@@ -12,7 +12,7 @@ use tidy::circles::{Graph, crates};
 use tidy::known::{Counts, Known, PATH, file_of};
 use tidy::rules::RULES;
 use tidy::tree::Tree;
-use tidy::{Finding, arrows, bars, coverage, dependencies, evidence, words};
+use tidy::{Finding, arrows, bars, coverage, dependencies, engine_lines, evidence, words};
 
 fn main() -> ExitCode {
     let done = match std::env::args().nth(1).as_deref() {
@@ -56,6 +56,7 @@ fn figures(tree: &Tree) -> Result<(), Finding> {
     let packet = dependencies::cargo_tree("packet").map_err(|error| Finding::new("Cargo.toml", 0, error))?;
     let (text, holds) = bars::text(&bars::rows(tree, &packet)?);
     print!("{text}");
+    print!("{}", engine_lines::text(tree));
     println!("        before: commit {}", bars::COMMIT_BEFORE);
     for allowed in words::ALLOWED {
         println!("        allowed words in {}: {}", allowed.file, allowed.reason);
@@ -71,7 +72,7 @@ fn figures(tree: &Tree) -> Result<(), Finding> {
 fn counted(directory: &Path) -> Result<(), Finding> {
     let name = directory.display().to_string();
     let tree = Tree::read(directory).map_err(|error| Finding::new(&name, 0, error.to_string()))?;
-    print!("{}", bars::Counted::of(&tree)?);
+    print!("{}{}", bars::Counted::of(&tree)?, engine_lines::Lines::of(&tree));
     Ok(())
 }
 
@@ -87,7 +88,7 @@ fn run(shrink: bool) -> Result<(), Finding> {
         let (places, sum) = (counts.len(), counts.values().sum::<usize>());
         println!("{}: {places} places, {sum} in all, {} known", rule.name, known.total(rule.name));
         if shrink && tree.file(PATH).is_some() && sum > known.total(rule.name) {
-            return Err(Finding::new(PATH, 0, format!("{} has grown: mend it", rule.name)));
+            return Err(Finding::new(PATH, 0, format!("{} has grown: correct it", rule.name)));
         }
         found.push((rule.name, counts));
     }

@@ -166,7 +166,7 @@ mod tests {
     use super::*;
 
     fn findings(path: &str, text: &str) -> Vec<String> {
-        let page = "# 7. Clocks\n## 7.1 Delays\n### 7.2.1 Loop\n| CR-12 | told once | x |\n| REQ031 | M | y |\n";
+        let page = "# 7. Clocks\n## 7.1 Delays\n### 7.2.1 Loop\n| CR-12 | reported once | x |\n| REQ031 | M | y |\n";
         let files = vec![File::new("docs/protocol/07-clocks.md", page), File::new(path, text)];
         unresolved(&Tree { files }).iter().map(ToString::to_string).collect()
     }

@@ -8,7 +8,7 @@ use crate::tree::{File, Tree};
 
 /// Crates and single files that may contain `unsafe`, each with its reason.
 const ALLOWED: &[(&str, &str)] = &[
-    ("crates/link/", "talks to the kernel"),
+    ("crates/link/", "calls the kernel"),
     ("crates/ffi/", "is called from C"),
     ("crates/scenarios/src/counting_allocator.rs", "a global allocator that counts allocations of the cyclic path"),
     ("crates/scenarios/src/shared_memory.rs", "maps memory that two processes share"),

@@ -4,9 +4,9 @@ use tidy::known::Known;
 use tidy::rules::RULES;
 use tidy::tree::Tree;
 use tidy::{
-    Finding, coverage, covers, crates, decisions, deny, dependencies, errors, evidence, explorers, features, files,
-    handed_on, interface, links, mailboxes, modules, non_exhaustive, paths, protocol, publishing, reports, safety,
-    sources, toolchain, words,
+    Finding, coverage, covers, crates, decisions, deny, dependencies, engine_lines, errors, evidence, explorers,
+    features, files, handed_on, interface, links, mailboxes, modules, non_exhaustive, paths, protocol, publishing,
+    reports, safety, sources, toolchain, words,
 };
 
 fn tree() -> Tree {
@@ -239,6 +239,11 @@ fn lines_fit_120_columns() {
 fn no_words_for_people_are_used_for_devices() {
     only_what_is_known("words");
     none(words::stale(&tree()));
+}
+
+#[test]
+fn capabilities_of_the_engine_name_files_that_exist() {
+    none(engine_lines::stale(&tree()));
 }
 
 #[test]

@@ -9,7 +9,7 @@
 //! [`Header`], [`SubDeviceRecord`], [`Diagnosis`] and [`Answer`]; the others are bytes of the application.
 //!
 //! Versions (decision 0130): a later version appends fields and areas, and changes nothing. A reader ignores bytes
-//! behind the fields and areas that it knows; each sender names the oldest version whose readers understand it.
+//! behind the fields and areas that it supports; each sender names the oldest version whose readers understand it.
 
 mod answer;
 mod cursor;

@@ -149,7 +149,7 @@ fn line(course: &Course, number: usize, scale: Scale) -> String {
     path
 }
 
-/// Neighbours far apart on the colour wheel: by the golden angle. As red, green and blue, which every viewer knows.
+/// Neighbours far apart on the colour wheel: by the golden angle. As red, green and blue, which every viewer supports.
 fn colour(number: usize) -> String {
     let hue = ((number * 137 + 210) % 360) as f64 / 60.0;
     // Saturation 65 %, lightness 42 %.

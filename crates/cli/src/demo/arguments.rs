@@ -35,8 +35,8 @@ pub struct DemoArguments {
     pub fast: bool,
     /// Show two controllers at the ring, one of which is killed
     ///
-    /// Both use the library, and each takes over from the other: when that one is killed, loses its power, or hands its
-    /// role over while a cable is cut. See docs/standby.md, which begins with a note on patents.
+    /// Both use the library. One takes over when the other is killed, loses its power or hands its role over, once
+    /// while a cable is cut. See docs/standby.md, which begins with a note on patents.
     #[cfg(feature = "standby")]
     #[arg(long, help_heading = "Two controllers")]
     pub standby: bool,

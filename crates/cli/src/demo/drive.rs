@@ -106,8 +106,8 @@ impl Drive {
         self.command(data);
     }
 
-    /// One cycle of one of two controllers: the target is always the last one of the ACTIVE and a step, so that
-    /// another controller goes on where the first one has ended.
+    /// One cycle of one of two controllers. The target is the last target of the ACTIVE plus a step, so a takeover
+    /// continues the movement.
     #[cfg(feature = "standby")]
     pub fn go_on(&mut self, data: &mut ProcessData<'_>) {
         self.state = State::decode(data.read(&self.statusword));

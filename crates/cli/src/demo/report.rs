@@ -69,13 +69,13 @@ impl Reporter {
         self.reached_op
     }
 
-    /// Something that was checked.
+    /// A check and its result.
     pub fn check(&mut self, check: Check) {
         self.say(&format!("  {} {}", if check.held { "ok    " } else { "FAILED" }, check.text));
         self.checks.push(check);
     }
 
-    /// What was checked so far.
+    /// The checks so far.
     #[cfg(feature = "standby")]
     pub fn checks(&self) -> &[Check] {
         &self.checks

@@ -1,12 +1,12 @@
 //! `ringcat demo --standby`: two controllers at one simulated ring. A controller is killed and started again, roles are
-//! handed over, once while a cable is cut, and a controller loses its power. What each SubDevice notices is read inside
-//! the simulated devices.
+//! handed over, once while a cable is cut, and a controller loses its power. The effects are measured inside the
+//! simulated devices.
 //!
 //! Both controllers are programs with the library, each in a thread of its own; virtual time passes only while all of
-//! them wait, so a machine that is late changes nothing.
+//! them wait, so delays of the machine do not change the result.
 
 mod controller;
-mod judge;
+mod measurement;
 mod report;
 mod steps;
 
@@ -29,7 +29,7 @@ use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::verdict::{Report, Verdict};
 use controller::{Settings, Shared};
-use judge::Judge;
+use measurement::Measurement;
 use report::{Incident, Outcome};
 use steps::{STEPS, Step, Times, cable_to_cut, name};
 
@@ -41,7 +41,7 @@ const FIRST_LISTENS: Duration = Duration::from_millis(10);
 const LISTEN: (Duration, u32) = (Duration::from_millis(500), 10);
 /// How long an incident lasts at least, in milliseconds, and in cycles.
 const LASTS: (u64, u32) = (400, 50);
-/// Until all SubDevices are in OP at the most, and until an incident is over; beside some time-outs.
+/// Time limit until all SubDevices are in OP, and until an incident is over; some time-outs are added.
 const LIMIT: Duration = Duration::from_secs(30);
 /// Bytes of process data that fit into the frame of a cycle.
 const ONE_FRAME: usize = 1_400;
@@ -51,12 +51,12 @@ struct Two {
     hosts: TwoHosts,
     shared: Arc<Shared>,
     times: Times,
-    /// When the wall clock was at the beginning of virtual time; `None`: virtual time does not wait.
+    /// Wall clock at the beginning of virtual time; `None`: virtual time does not wait for it.
     began: Option<WallClock>,
     late: Duration,
     cable: CableId,
     active: Host,
-    judge: Option<Judge>,
+    measurement: Option<Measurement>,
     reporter: Reporter,
     names: Names,
     incidents: Vec<Incident>,
@@ -84,7 +84,7 @@ pub fn run(arguments: &DemoArguments) -> Result<Report, Failure> {
         late: Duration::ZERO,
         cable,
         active: Host::First,
-        judge: None,
+        measurement: None,
         reporter,
         names: Names::default(),
         incidents: Vec::new(),
@@ -123,7 +123,7 @@ impl Two {
                 format!("not all SubDevices in OP with two controllers within {} s: {why}", self.limit().as_secs());
             return Ok(self.report(Verdict::Failed(text)));
         }
-        self.begin_to_judge();
+        self.begin_to_measure();
         for step in STEPS {
             self.step(step)?;
         }
@@ -140,7 +140,7 @@ impl Two {
 
     fn outcome(&self) -> Outcome<'_> {
         Outcome {
-            judge: self.judge.as_ref(),
+            measurement: self.measurement.as_ref(),
             incidents: &self.incidents,
             times: self.times,
             names: &self.names,
@@ -149,8 +149,8 @@ impl Two {
         }
     }
 
-    /// From now on all is judged: everything is in OP, and the other controller is ready.
-    fn begin_to_judge(&mut self) {
+    /// Begins the measurement: all SubDevices are in OP, and the other controller is ready.
+    fn begin_to_measure(&mut self) {
         let identities = Host::ALL.map(|host| self.shared.board(host).identity);
         let Some(layout) = self.shared.layout.get() else { return };
         let count = layout.places.len();
@@ -160,7 +160,8 @@ impl Two {
         });
         self.times.several_frames = layout.bytes > ONE_FRAME;
         let cycle = self.times.cycle;
-        self.judge = Some(self.hosts.with_network(|network| Judge::new(network, &layout.places, cycle, identities)));
+        self.measurement =
+            Some(self.hosts.with_network(|network| Measurement::new(network, &layout.places, cycle, identities)));
     }
 
     fn start(&mut self, host: Host, listen: Duration) -> Result<(), Failure> {
@@ -175,7 +176,7 @@ impl Two {
 
     /// An incident, until it is over.
     fn step(&mut self, step: Step) -> Result<(), Failure> {
-        // Somewhere in a cycle.
+        // At a moment within a cycle.
         self.pass(self.times.cycle * 3 / 10);
         let text = step.describe(self.active, &self.cable_in_words());
         self.reporter.timed(self.hosts.now(), ">", None, &format!("{}: {text}", self.incidents.len() + 1));
@@ -186,8 +187,8 @@ impl Two {
             text,
             failure: None,
         });
-        if let Some(judge) = &mut self.judge {
-            judge.begin();
+        if let Some(measurement) = &mut self.measurement {
+            measurement.begin();
         }
         let active = self.active;
         match step {
@@ -246,7 +247,7 @@ impl Two {
         LIMIT + self.times.cycle * self.times.time_out_cycles.saturating_mul(4)
     }
 
-    /// Lets at least this time pass, until all is as it should be. False if that takes too long.
+    /// Lets at least this time pass, until the expected state is reached. False if the time limit expires.
     fn until(&mut self, least: Duration, two: bool, ring: bool) -> bool {
         let begin = self.hosts.now();
         while self.hosts.now().since(begin) < self.limit().max(least) {
@@ -261,7 +262,7 @@ impl Two {
         false
     }
 
-    /// What is not as it should be.
+    /// What differs from the expected state.
     fn why_not(&self, two: bool, ring: bool) -> Option<String> {
         for host in Host::ALL {
             if let Some(failure) = &self.shared.board(host).failure {
@@ -273,7 +274,7 @@ impl Two {
         if board.role != Some(MainDeviceRole::Active) {
             return Some(format!("controller {active} is not ACTIVE"));
         }
-        if !board.is_settled || self.judge.as_ref().is_some_and(|judge| !judge.all_in_op()) {
+        if !board.is_settled || self.measurement.as_ref().is_some_and(|measurement| !measurement.all_in_op()) {
             return Some("not all SubDevices are in OP".to_owned());
         }
         if board.is_other_ready != two {
@@ -285,13 +286,13 @@ impl Two {
             .then(|| format!("the ring of controller {active} is not {}", if ring { "closed" } else { "open" }))
     }
 
-    /// Lets time pass, looks at what happened in each cycle, and keeps pace with the wall clock.
+    /// Lets time pass, measures each cycle, and waits for the wall clock.
     fn pass(&mut self, time: Duration) {
         let end = self.hosts.now() + time;
         while self.hosts.now() < end {
             self.hosts.run_until(end.min(self.hosts.now() + self.times.cycle));
-            if let Some(judge) = &mut self.judge {
-                self.hosts.with_network(|network| judge.look(network));
+            if let Some(measurement) = &mut self.measurement {
+                self.hosts.with_network(|network| measurement.look(network));
             } else {
                 drop(self.hosts.with_network(Network::take_host_log));
             }
@@ -305,7 +306,7 @@ impl Two {
         }
     }
 
-    /// The events of both controllers that a user wants to see.
+    /// Prints the events of both controllers, except those of every cut.
     fn print_events(&mut self) {
         for host in Host::ALL {
             let events = std::mem::take(&mut self.shared.board(host).events);
@@ -313,7 +314,7 @@ impl Two {
                 let is_shown = match &event.event {
                     Event::Standby(_) => true,
                     Event::ForeignFrame { .. } | Event::Domain { .. } | Event::Skipped { .. } => false,
-                    _ => self.judge.is_some(),
+                    _ => self.measurement.is_some(),
                 };
                 if is_shown {
                     self.reporter.event_of(name(host), &event, &self.names);
@@ -325,7 +326,7 @@ impl Two {
     /// The cable that is cut, in words.
     fn cable_in_words(&self) -> String {
         let positions: Vec<usize> =
-            self.judge.iter().flat_map(|judge| judge.watched.iter().map(|it| it.device.0)).collect();
+            self.measurement.iter().flat_map(|measurement| measurement.watched.iter().map(|it| it.device.0)).collect();
         let end = |end: Endpoint| match end {
             Endpoint::Device(device, _) => {
                 let position = positions.iter().position(|at| *at == device.0).unwrap_or(device.0);

@@ -11,7 +11,7 @@ const MODULES: Topic = Topic {
     why: "a MainDevice inside the kernel may take the interface, and sends beside this one",
 };
 const PROGRAM: Topic =
-    Topic { id: "ethercat-program", why: "the command ethercat then speaks to another MainDevice than ringcatd" };
+    Topic { id: "ethercat-program", why: "the command ethercat then controls another MainDevice than ringcatd" };
 const HEADER: Topic =
     Topic { id: "ecrt-header", why: "programs in C are then compiled for another version of the interface" };
 const LIBRARY: Topic =

@@ -18,7 +18,7 @@ const SOCKETS: Topic =
 const MTU: Topic = Topic { id: "mtu", why: "EtherCAT frames of full length need an MTU of 1500" };
 const MANAGER: Topic = Topic {
     id: "network-manager",
-    why: "a network manager asks for addresses, sends frames of its own and may switch the interface off",
+    why: "a network manager requests addresses, sends frames of its own and may switch the interface off",
 };
 const DRIVER: Topic =
     Topic { id: "driver", why: "behind USB or a virtual device, frames wait for others to be polled" };
@@ -82,7 +82,7 @@ fn link(interface: &Interface, settings: &Settings) -> Finding {
                 format!("{mbits} Mbit/s: most EtherCAT has 100, so this may be no SubDevice"),
                 &["see what the other end of the cable is plugged into"],
             ),
-            None => LINK.unknown("up, with a link partner; the driver does not tell its speed"),
+            None => LINK.unknown("up, with a link partner; the driver does not report its speed"),
         },
         Err(reason) => LINK.unknown(format!("up, with a link partner; its speed: {reason}")),
     }
@@ -95,8 +95,8 @@ fn other_users(name: &str, uses: &Uses) -> Vec<Finding> {
     let has = |findings: &[Finding], topic: Topic| findings.iter().any(|finding| finding.id == topic.id);
     for what in &uses.unknown {
         match what {
-            Unknown::Addresses => findings.push(ADDRESS.unknown("the kernel does not tell addresses")),
-            Unknown::Membership => findings.push(MEMBERSHIP.unknown("the kernel does not tell what it belongs to")),
+            Unknown::Addresses => findings.push(ADDRESS.unknown("the kernel does not report addresses")),
+            Unknown::Membership => findings.push(MEMBERSHIP.unknown("the kernel does not report what it belongs to")),
             Unknown::Sockets => findings.push(SOCKETS.unknown("/proc/net/packet cannot be read")),
             _ => {}
         }

@@ -69,7 +69,7 @@ fn virtual_machine(machine: &dyn Inspect) -> Result<Finding, Unseen> {
     // Processors of ARM have Features, and no flag for this.
     let flags = text.lines().find_map(|line| line.strip_prefix("flags")).and_then(|rest| rest.split_once(':'));
     let Some((_, flags)) = flags else {
-        return Ok(VIRTUAL.unknown("the processors do not tell"));
+        return Ok(VIRTUAL.unknown("the processors do not report it"));
     };
     if flags.split_whitespace().any(|flag| flag == "hypervisor") {
         return Ok(VIRTUAL.bad("this is one", &["run the MainDevice on the hardware itself"]));

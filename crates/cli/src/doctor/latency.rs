@@ -180,7 +180,7 @@ pub mod tests {
 
     // covers: bench
     #[test]
-    fn a_latency_is_judged_by_its_longest_delay() {
+    fn a_latency_is_rated_by_its_longest_delay() {
         use super::super::finding::Level::{Bad, Good, Minor, Unknown};
         let level = |delays: &[(u64, u64)]| measured(delays).finding().level;
         let levels = [level(&[]), level(&[(5, 9_000)]), level(&[(5, 9_000), (100, 1)]), level(&[(500, 1)])];

@@ -202,7 +202,7 @@ fn is_of(line: &str, number: &str, interfaces: &[&str]) -> bool {
 fn siblings(machine: &dyn Inspect) -> Result<Finding, Unseen> {
     online(machine)?;
     Ok(match inspect::read_if_there(machine, &format!("{PROCESSORS}/smt/active"))?.as_deref() {
-        None => SIBLINGS.good("this kernel knows none"),
+        None => SIBLINGS.good("this kernel reports none"),
         Some("0") => SIBLINGS.good("each core has one thread"),
         Some(_) => SIBLINGS
             .minor("cores have two threads or more", &["echo off | sudo tee /sys/devices/system/cpu/smt/control"]),

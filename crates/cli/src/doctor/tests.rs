@@ -86,7 +86,7 @@ fn files_that_hold_anything_are_unknown_and_never_a_panic() {
 #[test]
 fn directories_and_pipes_in_the_place_of_files_are_not_waited_for() {
     let specimen = Specimen::good();
-    fs::create_dir_all(specimen.root.join("proc/a-directory")).expect("it is ours");
+    fs::create_dir_all(specimen.root.join("proc/a-directory")).expect("it is writable");
     let pipe = specimen.root.join("proc/a-pipe");
     let made = std::process::Command::new("mkfifo").arg(&pipe).status();
     assert!(made.is_ok_and(|status| status.success()));
@@ -115,7 +115,7 @@ fn a_word_is_found_wherever_it_is_in_a_file() {
 
 // covers: bench
 #[test]
-fn the_library_that_the_loader_takes_first_is_judged() {
+fn the_library_that_the_loader_takes_first_is_checked() {
     let mut specimen = Specimen::good();
     let entries =
         [(loader_cache::NAME, "/opt/other/lib/libethercat.so.1"), (loader_cache::NAME, "/usr/lib/libethercat.so.1")];

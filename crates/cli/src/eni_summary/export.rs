@@ -22,7 +22,7 @@ const STANDARD_OUTPUT: &str = "-";
 /// SubDevices that a warning lists.
 const LISTED: usize = 8;
 
-/// What a user should know before.
+/// Text at the end of the long help.
 const ABOUT_EXPORT: &str = "\
 The ENI has every command that a MainDevice sends to bring the network to OP.
 It is read again before it is written: what an ENI cannot express is refused

@@ -17,7 +17,7 @@ use crate::json::esi::EsiDeclared;
 use crate::output::{counted, say, warn};
 use crate::verdict::{Report, Verdict};
 
-/// What a user should know before.
+/// Text at the end of the long help.
 const ABOUT_DECLARE: &str = "\
 All choices are checked against the rules of the description: mandatory, fixed
 and exclusive PDOs, SyncManagers, modules of slots, limits of objects. What does

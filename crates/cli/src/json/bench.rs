@@ -94,6 +94,6 @@ pub struct Try {
     pub skipped_cycles: u64,
     /// Cycles that were left out in stalls of the machine
     pub stalled_cycles: u64,
-    /// The latest begin of a cycle behind its time, in nanoseconds
+    /// Longest delay of a cycle after the time at which it should begin, in nanoseconds
     pub longest_delay_ns: u64,
 }

@@ -32,7 +32,7 @@ pub struct Clock {
     pub locked: bool,
     /// Propagation delay from the reference clock (register 0x0928), in nanoseconds; null where none was written
     pub delay_ns: Option<i64>,
-    /// Where a fork without a clock hides the propagation delay; null elsewhere
+    /// Bounds of a propagation delay that a fork without a clock hides; null without such a fork
     pub delay_hidden: Option<HiddenDelay>,
     /// Offset from its own time to system time (register 0x0920), in nanoseconds
     pub offset_ns: i64,

@@ -13,13 +13,13 @@ pub struct Demo {
     pub cycle_ns: u64,
     /// The SubDevices, in the order of their positions
     pub subdevices: Vec<SubDevice>,
-    /// Their states in the end
+    /// Their states at the end
     pub states: Vec<State>,
     /// Time from power-on to OP of the last SubDevice, in nanoseconds; null where not all reached OP
     pub op_after_ns: Option<u64>,
-    /// What happened to the segment, in its order, and what it cost
+    /// Incidents in the segment in their order, and the cycles that each one cost
     pub incidents: Vec<Incident>,
-    /// What was checked in the end
+    /// The checks at the end
     pub checks: Vec<Check>,
 }
 

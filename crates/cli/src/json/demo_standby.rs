@@ -14,11 +14,11 @@ pub struct DemoStandby {
     pub time_out_cycles: u32,
     /// The controller that is ACTIVE at the end: `A` or `B`; null where none is
     pub active: Option<&'static str>,
-    /// What happened to controllers and ring, in its order
+    /// Incidents of controllers and ring in their order
     pub incidents: Vec<StandbyIncident>,
-    /// What each SubDevice noticed, in the order of their positions; empty where not all reached OP
+    /// Effects on each SubDevice, in the order of their positions; empty if not all reached OP
     pub subdevices: Vec<Noticed>,
-    /// What was checked in the end
+    /// The checks at the end
     pub checks: Vec<Check>,
 }
 
@@ -36,7 +36,7 @@ pub struct StandbyIncident {
     pub limit_ns: u64,
 }
 
-/// What a SubDevice noticed.
+/// Effects on a SubDevice.
 #[derive(Clone, Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Noticed {

@@ -36,7 +36,7 @@ pub struct Finding {
     pub what: String,
     /// Why it matters, for people
     pub why: &'static str,
-    /// Commands and steps that mend it, one each; empty for what is good or unknown
+    /// Commands and steps that correct it, one each; empty for good and unknown findings
     pub mend: Vec<String>,
 }
 

@@ -52,7 +52,7 @@ pub struct SubDevice {
     pub revision: Option<u32>,
     /// Serial number that is compared; null where it is not compared
     pub serial: Option<u32>,
-    /// The port that it is plugged into; null at an interface, and where the file does not say
+    /// The port that it is plugged into; null at an interface, and where the file does not state it
     pub connected_to: Option<DeclaredPort>,
     /// Its SyncManagers; null where its EEPROM is followed
     pub sync_managers: Option<Vec<SyncManager>>,
@@ -309,6 +309,6 @@ pub struct LeftOut {
     pub subdevice: Option<usize>,
     /// The setting
     pub what: String,
-    /// Why it is not there, and what is without it
+    /// The reason, and the effect
     pub reason: String,
 }

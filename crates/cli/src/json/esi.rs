@@ -6,7 +6,7 @@ use serde::Serialize;
 #[derive(Clone, Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct EsiList {
-    /// The devices that were asked for
+    /// The devices that match
     pub devices: Vec<Device>,
     /// Files of the folder
     pub files: usize,
@@ -41,7 +41,7 @@ pub struct Device {
     pub line: u32,
     /// Whether another description hides it from lists
     pub is_hidden: bool,
-    /// With a revision asked for: exact, older or newer; null without
+    /// With `--revision`: exact, older or newer; null without
     pub choice: Option<String>,
 }
 
@@ -89,7 +89,7 @@ pub struct EsiShow {
     pub objects: usize,
     /// Start-up commands of CoE
     pub startup_commands: usize,
-    /// What of the file is not used
+    /// Parts of the file that are not used
     pub notices: Vec<String>,
 }
 
@@ -185,6 +185,6 @@ pub struct EsiDeclared {
     pub bytes: usize,
     /// SHA-256 of the canonical text of the network file, in hexadecimal digits
     pub digest: String,
-    /// What of the description is not used
+    /// Parts of the description that are not used
     pub notices: Vec<String>,
 }

@@ -52,7 +52,7 @@ pub struct ResultLine<'a> {
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Ending {
-    /// `ok`: everything held; `failed`: it ran and something did not hold; `error`: it could not do what was asked
+    /// `ok`: everything held; `failed`: it ran and something did not hold; `error`: it could not be carried out
     pub outcome: Outcome,
     /// Exit status of the program: 0, 1 or 2, in the order of the outcomes
     pub exit_code: u8,

@@ -27,13 +27,13 @@ pub struct Run {
     pub acyclic: Acyclic,
     /// From sending a frame to the arrival of a copy; null where none arrived since OP was reached
     pub round_trips: Option<Times>,
-    /// Begins of cycles behind their time; null without a cycle since OP was reached
+    /// Delays of cycles after the time at which they should begin; null without a cycle since OP was reached
     pub wake_ups: Option<Times>,
     /// Jobs of the cycles with their times, in the order of a cycle (--jobs)
     pub jobs: Vec<Job>,
     /// The distributed clocks; null where they are not in use
     pub clocks: Option<Clocks>,
-    /// What the interfaces have carried for process data; empty where the stop failed
+    /// Frames of the interfaces with process data; empty where the stop failed
     pub interfaces: Vec<Interface>,
     /// Network interfaces for EoE (--eoe)
     pub ethernet: Vec<Ethernet>,

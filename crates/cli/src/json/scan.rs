@@ -36,9 +36,9 @@ pub struct SubDevice {
     pub revision: u32,
     /// Serial number
     pub serial: u32,
-    /// Bytes of cyclic outputs as its EEPROM says; null where the EEPROM contradicts itself
+    /// Bytes of cyclic outputs according to its EEPROM; null where the EEPROM contradicts itself
     pub output_bytes: Option<u32>,
-    /// Bytes of cyclic inputs as its EEPROM says; null where the EEPROM contradicts itself
+    /// Bytes of cyclic inputs according to its EEPROM; null where the EEPROM contradicts itself
     pub input_bytes: Option<u32>,
     /// The port on the way to the main interface that its entry port is connected to; null at an interface
     pub connected_to: Option<Port>,

@@ -18,7 +18,7 @@ pub struct SiiBuilt {
     pub bytes: usize,
     /// Bytes up to the end marker
     pub used_bytes: usize,
-    /// What is not in the image as the description says it
+    /// Parts of the description that the image does not have
     pub notices: Vec<String>,
 }
 

@@ -29,7 +29,7 @@ pub struct Standby {
     pub takeover: Option<Takeover>,
 }
 
-/// Roles of a MainDevice of two.
+/// Roles of one of two MainDevices.
 #[derive(Clone, Debug, Default, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Takeover {

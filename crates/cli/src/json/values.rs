@@ -60,7 +60,7 @@ pub struct SyncSignals {
     pub assign_activate: u16,
     /// Cycle of SYNC0, in nanoseconds
     pub sync0_cycle_ns: u32,
-    /// Shift of SYNC0 behind the begin of the cycle, in nanoseconds
+    /// Shift of SYNC0 after the beginning of the cycle, in nanoseconds
     pub sync0_shift_ns: i32,
     /// Cycle of SYNC1, in nanoseconds; 0 without SYNC1
     pub sync1_cycle_ns: u32,

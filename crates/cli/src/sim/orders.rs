@@ -118,7 +118,7 @@ fn answer(words: &[&str], plant: &mut Plant) -> Result<String, String> {
     }
 }
 
-/// The truth about the clocks, which no MainDevice sees. Those of 32 bits are compared in 32 bits.
+/// The true differences of the clocks, which no MainDevice can read. Those of 32 bits are compared in 32 bits.
 fn clocks(network: &Network) -> String {
     let time = |device: &Device| {
         let has_clock = device.description.dc.is_some();

@@ -100,8 +100,8 @@ impl<L: Links> Links for BeatingLinks<L> {
         self.links.has_frame()
     }
 
-    fn knows_arrivals(&self) -> bool {
-        self.links.knows_arrivals()
+    fn has_arrival_times(&self) -> bool {
+        self.links.has_arrival_times()
     }
 
     fn received_at(&mut self, sent_at: Instant, now: Instant) -> Option<Instant> {

@@ -24,7 +24,7 @@ pub struct Joiner {
     pub declared: Arc<DeclarationArguments>,
     pub network: Option<Arc<ConfiguredNetwork>>,
     pub thread: ThreadArguments,
-    /// The other MainDevice is ready to take over, as this one knows it as ACTIVE.
+    /// The other MainDevice is ready to take over, as determined while this one is ACTIVE.
     pub partner_ready: Arc<AtomicBool>,
     pub beats: Arc<Beats>,
     /// Names of the SubDevices, when they are known.

@@ -12,7 +12,7 @@ use crate::run::declared::DeclarationArguments;
 use crate::thread::ThreadArguments;
 use crate::times::time;
 
-/// From the limit of a guard to the takeover at least: it sees that, and switches two interfaces off.
+/// From the limit of a guard to the takeover at least: it detects the end, and switches two interfaces off.
 const GUARD_ACTS: Duration = Duration::from_millis(2);
 
 /// What it is for, and what it is not.
@@ -30,10 +30,10 @@ hangs, or is stopped for longer than --guard.
 
 Without a declaration it never sends on its own. With --eni, --network or
 --automatic it is one of two controllers with the same declaration: INACTIVE
-where it hears an ACTIVE, otherwise ACTIVE. As INACTIVE it takes over when it
-has heard no process data for --timeout cycles. At its end an ACTIVE hands the
+if frames of an ACTIVE arrive, otherwise ACTIVE. As INACTIVE it takes over when
+no process data has arrived for --timeout cycles. At its end an ACTIVE hands the
 role over if the other one is ready; otherwise it stops the bus as `ringcat run`
-does. Exit status 1 if something did not hold, and the last line says what.
+does. Exit status 1 if something did not hold; the last line reports what.
 
 See docs/standby.md, which begins with a note on patents.";
 
@@ -99,7 +99,7 @@ pub struct PolicyArguments {
     timeout: u32,
     /// How long this one listens at its start; a random pause up to this time follows
     ///
-    /// Where it hears no ACTIVE it becomes ACTIVE then.
+    /// If no frame of an ACTIVE arrives, it becomes ACTIVE then.
     #[arg(long, value_name = "TIME", value_parser = time, default_value = "2s", requires = "declaration")]
     listen: Duration,
     /// Stay INACTIVE: neither take over, nor be handed the role over

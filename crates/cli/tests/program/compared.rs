@@ -11,10 +11,10 @@ fn folded(said: &Said) -> String {
 
 /// The descriptions, changed by a function, with their modules.
 fn descriptions(place: &Place, change: impl Fn(&str) -> String) -> String {
-    fs::create_dir(place.path("modules")).expect("it is ours");
-    let modules = fs::read_to_string(format!("{ACME}/modules/acme-modules.xml")).expect("it is ours");
+    fs::create_dir(place.path("modules")).expect("it is writable");
+    let modules = fs::read_to_string(format!("{ACME}/modules/acme-modules.xml")).expect("it is writable");
     place.write("modules/acme-modules.xml", &modules);
-    let text = fs::read_to_string(format!("{ACME}/acme.xml")).expect("it is ours");
+    let text = fs::read_to_string(format!("{ACME}/acme.xml")).expect("it is writable");
     let changed = change(&text);
     place.write("acme.xml", &changed)
 }
@@ -42,7 +42,7 @@ fn another_assignment_of_a_device_with_coe_is_named_in_both_directions() {
         let verdict = "result: FAILED: 1 difference from the file, 0 of them prevent OP";
         assert_eq!(differs.verdict(), verdict, "{}", differs.all());
     }
-    let text = fs::read_to_string(&acme).expect("it is ours");
+    let text = fs::read_to_string(&acme).expect("it is writable");
     place.write("fewer.xml", &text.replacen("<TxPdo Fixed=\"1\" Sm=\"3\">", "<TxPdo Fixed=\"1\">", 1));
     let fewer = place.write("fewer.toml", "[[device]]\nesi = \"fewer.xml\"\ntype = \"AA02\"\n");
     compare(&[]);
@@ -66,7 +66,7 @@ fn pdos_of_modules_that_the_eeprom_cannot_list_are_no_differences() {
     place.write(
         "listed.xml",
         &fs::read_to_string(&acme)
-            .expect("it is ours")
+            .expect("it is writable")
             .replace("MaxSlotCount=\"4\"", "MaxSlotCount=\"4\" DownloadModuleIdentList=\"1\""),
     );
     for file in ["acme.xml", "listed.xml"] {

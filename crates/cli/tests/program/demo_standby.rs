@@ -46,7 +46,7 @@ fn a_time_out_longer_than_the_watchdogs_makes_the_demonstration_fail() {
 
 // covers: demo, standby
 #[test]
-fn other_rings_and_cycles_hold_too() {
+fn the_demonstration_holds_on_other_rings_and_with_other_cycles() {
     let path = std::env::temp_dir().join(format!("ringcat-ring-{}.toml", std::process::id()));
     let branch = "[[device]]\nname = \"side\"\ntype = \"digital-output-8\"\nattach = \"head.2\"\n";
     let segments = [

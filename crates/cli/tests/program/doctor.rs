@@ -44,7 +44,7 @@ fn the_doctor_prints_the_documented_keys_and_exits_with_1_where_something_is_bad
     assert_eq!(counts.map(|count| count["count"].as_u64().unwrap_or_default()).sum::<u64>(), wake_ups);
     let drawn = std::fs::read_to_string(&picture).expect("it was written");
     assert!(drawn.starts_with("<svg") && drawn.ends_with("</svg>\n"));
-    std::fs::remove_file(picture).expect("it is ours");
+    std::fs::remove_file(picture).expect("it is writable");
 }
 
 // covers: bench
@@ -104,7 +104,7 @@ fn the_page_of_the_doctor_explains_each_finding() {
     assert!(missing.is_empty(), "{missing:?}");
 }
 
-/// Files that a command opens for writing or makes, and requests that change an interface, as strace sees them.
+/// Files that a command opens for writing or makes, and requests that change an interface, as recorded by strace.
 fn written(trace: &str) -> Vec<&str> {
     let calls = trace.lines().filter(|line| !line.contains(" = -1 "));
     let opens = |line: &&str| {
@@ -134,7 +134,7 @@ fn the_doctor_writes_nothing_but_the_request_of_its_measurement() {
     // Loopback is bad.
     assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
     let trace = std::fs::read_to_string(&path).expect("strace has written it");
-    std::fs::remove_file(path).expect("it is ours");
+    std::fs::remove_file(path).expect("it is writable");
     assert!(trace.contains("/proc/self/status"), "the looks are in the trace");
     let written: Vec<&str> =
         written(&trace).into_iter().filter(|line| !line.contains("/dev/cpu_dma_latency")).collect();

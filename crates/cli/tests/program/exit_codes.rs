@@ -150,7 +150,7 @@ fn files() -> PathBuf {
     let directory = std::env::temp_dir().join(format!("ringcat-exit-codes-{}", std::process::id()));
     fs::create_dir_all(&directory).expect("the temporary directory is writable");
     for (name, text) in FILES {
-        fs::write(directory.join(name), text).expect("it is ours");
+        fs::write(directory.join(name), text).expect("it is writable");
     }
     directory
 }
@@ -171,7 +171,7 @@ fn what_does_not_hold_is_said_last_and_none_of_it_exits_with_0() {
             wrong.push(format!("`{line}` -> {code:?}, expected {status}\n  {said}\n  expected {expected}"));
         }
     }
-    fs::remove_dir_all(&directory).expect("it is ours");
+    fs::remove_dir_all(&directory).expect("it is writable");
     assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), SITUATIONS.len(), wrong.join("\n"));
 }
 

@@ -22,7 +22,7 @@ impl Place {
     }
 
     pub fn write(&self, name: &str, text: &str) -> String {
-        fs::write(self.0.join(name), text).expect("it is ours");
+        fs::write(self.0.join(name), text).expect("it is writable");
         self.path(name)
     }
 
@@ -108,7 +108,7 @@ fn a_network_file_is_made_of_a_scan_compared_and_never_replaced_by_chance() {
 #[test]
 fn names_that_a_device_does_not_have_come_from_its_description() {
     let place = Place::new("names");
-    let text = fs::read_to_string(format!("{ACME}/acme.xml")).expect("it is ours");
+    let text = fs::read_to_string(format!("{ACME}/acme.xml")).expect("it is writable");
     let bare = text
         .replace("<Name>Status__Underrange</Name>", "<Name></Name>")
         .replace("<Name>AI Channel 2</Name>", "<Name></Name>")
@@ -117,13 +117,13 @@ fn names_that_a_device_does_not_have_come_from_its_description() {
     place.write("bare.xml", &bare);
     let terminals = "[[device]]\nesi = \"bare.xml\"\ntype = \"AA02\"\n\n[[device]]\ntype = \"digital-input-8\"\n";
     let bus = place.write("bus.toml", terminals);
-    fs::create_dir(place.path("esi")).expect("it is ours");
+    fs::create_dir(place.path("esi")).expect("it is writable");
     let described = text.replacen("<Name>Status__Underrange</Name>", "<Name></Name>", 1);
     place.write("esi/acme.xml", &described);
     for folder in ["", "esi/"] {
         let modules = format!("{folder}modules/acme-modules.xml");
-        fs::create_dir(place.path(&format!("{folder}modules"))).expect("it is ours");
-        fs::copy(format!("{ACME}/modules/acme-modules.xml"), place.path(&modules)).expect("it is ours");
+        fs::create_dir(place.path(&format!("{folder}modules"))).expect("it is writable");
+        fs::copy(format!("{ACME}/modules/acme-modules.xml"), place.path(&modules)).expect("it is writable");
     }
     let out = place.path("machine.toml");
     let init = |more: &[&str]| ringcat(&[&["init", "--sim", &bus, "--out", &out, "--overwrite"], more].concat());
@@ -150,10 +150,10 @@ fn names_that_a_device_does_not_have_come_from_its_description() {
 
 /// The descriptions as those of a bus, and changed by a function for the EEPROMs of its devices.
 fn with_bare_devices(place: &Place, devices: &str, bare: impl Fn(&str) -> String) -> String {
-    fs::create_dir(place.path("modules")).expect("it is ours");
-    let text = fs::read_to_string(format!("{ACME}/acme.xml")).expect("it is ours");
+    fs::create_dir(place.path("modules")).expect("it is writable");
+    let text = fs::read_to_string(format!("{ACME}/acme.xml")).expect("it is writable");
     place.write("bare.xml", &bare(&text));
-    let modules = fs::read_to_string(format!("{ACME}/modules/acme-modules.xml")).expect("it is ours");
+    let modules = fs::read_to_string(format!("{ACME}/modules/acme-modules.xml")).expect("it is writable");
     place.write("modules/acme-modules.xml", &bare(&modules));
     place.write("bus.toml", devices)
 }
@@ -279,7 +279,7 @@ fn a_folder_of_descriptions_is_listed_and_searched() {
 
 // covers: eni-read, network-file, esi-use, ES-07
 #[test]
-fn what_is_no_regular_file_is_refused_and_never_waited_for() {
+fn pipes_and_devices_are_refused_as_files_without_a_wait() {
     let place = Place::new("pipes");
     let (pipe, out) = (place.path("pipe.xml"), place.path("out.xml"));
     assert!(Command::new("mkfifo").arg(&pipe).status().expect("it is there").success());
@@ -322,7 +322,7 @@ fn images_are_built_compared_and_described_again() {
     );
     let mut bytes = fs::read(&image).expect("it was written");
     bytes[0x90] ^= 0x20;
-    fs::write(&image, &bytes).expect("it is ours");
+    fs::write(&image, &bytes).expect("it is writable");
     let differs = ringcat(&["sii", "compare", &image, "--esi", &acme]);
     assert!(differs.code == Some(1) && differs.out.contains("string"), "{}", differs.all());
     let skeleton = ringcat(&["sii", "skeleton", &image, "--out", &place.path("again.xml")]);
@@ -330,7 +330,7 @@ fn images_are_built_compared_and_described_again() {
     let bytes = fs::read(&image).expect("it is there");
     let wrong = place.path("wrong.bin");
     for (bad, reason) in [(vec![], "got 0"), ([&[bytes[0] ^ 1], &bytes[1..]].concat(), "checksum")] {
-        fs::write(&wrong, bad).expect("it is ours");
+        fs::write(&wrong, bad).expect("it is writable");
         let invalid = ringcat(&["sii", "compare", &wrong, &image, "--esi", &acme]);
         let is_said = invalid.verdict().contains("wrong.bin is invalid: ") && invalid.verdict().contains(reason);
         assert!(invalid.code == Some(1) && is_said, "{}", invalid.all());

@@ -78,7 +78,7 @@ impl<'a> Element<'a> {
     }
 
     /// Notes children whose names are not in this list.
-    pub fn knows(&self, names: &[&str]) {
+    pub fn expects(&self, names: &[&str]) {
         for child in self.elements().filter(|child| !names.contains(&child.name())) {
             child.note_unknown();
         }

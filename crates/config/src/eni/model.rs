@@ -33,7 +33,7 @@ pub struct Eni {
     pub more_unknown: usize,
 }
 
-/// An element that the reader does not know.
+/// An element unknown to the reader.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unknown {
     /// Its position in the file.

@@ -31,9 +31,9 @@ pub(super) fn parse(text: &str) -> Result<Eni, EniError> {
 }
 
 fn configuration(root: Element<'_>) -> Result<Eni, EniError> {
-    root.knows(&["Config"]);
+    root.expects(&["Config"]);
     let config = root.required("Config")?;
-    config.knows(&["Master", "Slave", "Cyclic", "ProcessImage"]);
+    config.expects(&["Master", "Slave", "Cyclic", "ProcessImage"]);
     let subdevices: Vec<SubDevice> =
         config.children("Slave").take(MAX_SUBDEVICES + 1).map(subdevice).collect::<Result<_, _>>()?;
     if subdevices.len() > MAX_SUBDEVICES {
@@ -50,10 +50,10 @@ fn configuration(root: Element<'_>) -> Result<Eni, EniError> {
 }
 
 fn main_device(element: Element<'_>) -> Result<MainDevice, EniError> {
-    element.knows(&["Info", "MailboxStates", "EoE", "InitCmds"]);
+    element.expects(&["Info", "MailboxStates", "EoE", "InitCmds"]);
     let mut found = MainDevice { eoe: element.child("EoE").is_some(), ..MainDevice::default() };
     if let Some(info) = element.child("Info") {
-        info.knows(&["Name", "Destination", "Source", "EtherType"]);
+        info.expects(&["Name", "Destination", "Source", "EtherType"]);
         found.name = info.text_of("Name");
         found.destination = info.hex_of("Destination")?.unwrap_or_default();
         found.source = info.hex_of("Source")?.unwrap_or_default();
@@ -68,9 +68,9 @@ fn main_device(element: Element<'_>) -> Result<MainDevice, EniError> {
 }
 
 fn subdevice(element: Element<'_>) -> Result<SubDevice, EniError> {
-    element.knows(&["Info", "ProcessData", "Mailbox", "InitCmds", "PreviousPort", "HotConnect", "DC"]);
+    element.expects(&["Info", "ProcessData", "Mailbox", "InitCmds", "PreviousPort", "HotConnect", "DC"]);
     let info = element.required("Info")?;
-    info.knows(&[
+    info.expects(&[
         "Name",
         "PhysAddr",
         "AutoIncAddr",
@@ -101,7 +101,7 @@ fn subdevice(element: Element<'_>) -> Result<SubDevice, EniError> {
 }
 
 fn previous_port(element: Element<'_>) -> Result<PreviousPort, EniError> {
-    element.knows(&["DeviceId", "Port", "PhysAddr"]);
+    element.expects(&["DeviceId", "Port", "PhysAddr"]);
     let port = element.required("Port")?;
     let letter = match port.text().as_str() {
         "A" | "a" => Port::A,
@@ -119,7 +119,7 @@ fn previous_port(element: Element<'_>) -> Result<PreviousPort, EniError> {
 }
 
 fn hot_connect(element: Element<'_>) -> Result<HotConnect, EniError> {
-    element.knows(&["GroupName", "GroupMemberCnt", "IdentifyCmd"]);
+    element.expects(&["GroupName", "GroupMemberCnt", "IdentifyCmd"]);
     let members: Option<u16> = element.number_of("GroupMemberCnt")?;
     if members == Some(0) {
         let expected = "at least 1, the head itself".to_owned();
@@ -134,7 +134,7 @@ fn hot_connect(element: Element<'_>) -> Result<HotConnect, EniError> {
 }
 
 fn clock(element: Element<'_>) -> Result<DistributedClock, EniError> {
-    element.knows(&["PotentialReferenceClock", "ReferenceClock", "CycleTime0", "CycleTime1", "ShiftTime"]);
+    element.expects(&["PotentialReferenceClock", "ReferenceClock", "CycleTime0", "CycleTime1", "ShiftTime"]);
     Ok(DistributedClock {
         place: element.place(),
         reference: element.flag_of("ReferenceClock")?,

@@ -101,7 +101,7 @@ fn name(device: &Device) -> String {
     texts.into_iter().find(|text| !text.is_empty()).unwrap_or_else(|| "SubDevice".to_owned())
 }
 
-/// Letters of the ports that a network file knows; others are no port of EtherCAT.
+/// Letters of the ports in a network file; others are no port of EtherCAT.
 fn ports(device: &Device) -> String {
     let letter = |kind: char| if matches!(kind, 'Y' | 'K' | 'H') { kind } else { ' ' };
     let letters: String = device.physics.chars().take(4).map(letter).collect();

@@ -432,7 +432,7 @@ pub struct Sync {
     pub assign_activate: u16,
     /// Cycle of SYNC0.
     pub sync0_cycle: Shift,
-    /// Shift of SYNC0 after the begin of the cycle.
+    /// Shift of SYNC0 after the beginning of the cycle.
     #[serde(default)]
     pub sync0_shift: Shift,
     /// Cycle of SYNC1: 0, that of SYNC0, or a multiple of it.

@@ -101,7 +101,7 @@ fn values_out_of_range_and_duplicates_name_line_and_device() {
 }
 
 /// Time that this thread has had a processor for, in ns: other programs do not count. Elapsed time where the kernel
-/// does not tell.
+/// does not report it.
 fn thread_time_ns(begin: Instant) -> u128 {
     let reports = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let of_thread = reports.and_then(|text| text.split(' ').next()?.parse().ok());

@@ -79,7 +79,7 @@ fn without_choices_the_assignment_is_that_of_the_file() {
 
 // covers: esi-declare, ES-63
 #[test]
-fn a_shift_adds_time_and_part_of_the_cycle_and_lost_settings_of_clocks_are_told() {
+fn a_shift_adds_time_and_part_of_the_cycle_and_lost_settings_are_reported() {
     let from = |text: &str| {
         let esi = acme_of(text);
         let choices = choices(|choices| choices.mode = Some("DC".to_owned()));

@@ -52,14 +52,14 @@ fn each_rule_for_a_revision_is_compared_as_far_as_equality_goes() {
         (HighEqual, vec![high.clone()], false),
         (HighEqualLowEqualOrGreater, vec![high], true),
     ];
-    for (rule, commands, is_told) in expected {
+    for (rule, commands, is_listed) in expected {
         let export = exported(rule);
         let model = model(&export.text);
         assert_eq!(compared(&model.subdevices[DRIVE]), commands, "{rule:?}");
         assert_eq!(model.subdevices[DRIVE].revision, Some(REVISION), "{rule:?}: Info has the whole revision");
-        let told: Vec<_> = export.left_out.iter().filter(|it| it.what == "check_revision").collect();
-        assert_eq!(told.iter().map(|it| it.subdevice).collect::<Vec<_>>(), vec![Some(DRIVE); is_told.into()]);
-        assert!(told.iter().all(|it| it.reason.contains("0x00120034")), "{told:?}");
+        let listed: Vec<_> = export.left_out.iter().filter(|it| it.what == "check_revision").collect();
+        assert_eq!(listed.iter().map(|it| it.subdevice).collect::<Vec<_>>(), vec![Some(DRIVE); is_listed.into()]);
+        assert!(listed.iter().all(|it| it.reason.contains("0x00120034")), "{listed:?}");
     }
 }
 

@@ -108,7 +108,7 @@ fn variables_have_unique_names_and_bytes_of_their_own() {
     let image = &configuration.image;
     let variables: Vec<(&str, u32, u32)> =
         image.variables.iter().map(|it| (it.name.as_str(), it.image_bit, it.bits)).collect();
-    // The SII knows the entries of the second PDO: SyncManager 3 has no place in the image.
+    // The SII has the entries of the second PDO: SyncManager 3 has no place in the image.
     assert_eq!(variables, [("Drive.Command.Controlword", 0, 16), ("Drive.Command.Target", 16, 32)]);
     assert_eq!((image.outputs_len, image.inputs_len), (7, 0));
     let twice = WHOLE

@@ -37,7 +37,7 @@ fn messages_are_decoded_as_they_were() {
 
 // covers: daemon
 #[test]
-fn another_version_is_told_from_the_header_alone() {
+fn another_version_is_detected_from_the_header_alone() {
     let mut bytes = encode(&upload()).expect("it is short");
     bytes[4] = 1;
     bytes[16..].fill(0xFF);

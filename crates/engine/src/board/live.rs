@@ -133,7 +133,7 @@ impl LiveWords {
         words.life.store(life.pack(), Ordering::Relaxed);
     }
 
-    /// Posts presence and AL status of a SubDevice as another MainDevice sees it.
+    /// Posts presence and AL status of a SubDevice as reported by another MainDevice.
     #[cfg(feature = "standby")]
     pub(crate) fn post_life(&self, subdevice: usize, life: Life) {
         if let Some(words) = self.subdevices.get(subdevice) {

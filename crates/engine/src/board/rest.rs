@@ -1,4 +1,4 @@
-//! Whether cyclic frames are on the wire, as far as the board knows.
+//! Whether cyclic frames are on the wire, according to the board.
 
 use super::Board;
 use crate::link::{Link, LinkSet};

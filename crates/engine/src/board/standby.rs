@@ -1,7 +1,7 @@
 //! What both halves exchange about the other MainDevice of the ring.
 //!
 //! The acyclic half of the ACTIVE posts its knowledge of the segment, which the cyclic half sends piece by piece; the
-//! cyclic half of the INACTIVE posts what it has heard.
+//! cyclic half of the INACTIVE posts what it has received.
 
 use core::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, AtomicU64, Ordering};
 
@@ -25,7 +25,7 @@ pub enum Takeover {
     ThroughInit,
     /// Process data of the other MainDevice: SubDevices keep their configuration.
     FromOther,
-    /// Its own last state: no other MainDevice was heard since. SubDevices keep their configuration.
+    /// Its own last state: no frame of another MainDevice has arrived since. SubDevices keep their configuration.
     FromItself,
 }
 

@@ -24,7 +24,7 @@ pub enum StandbyEvent {
         cause: RoleCause,
     },
     /// This MainDevice controls the bus, and goes on with the process data of the other one; with its own if it was
-    /// ACTIVE itself and has heard no other MainDevice since.
+    /// ACTIVE itself and has received no frame of another MainDevice since.
     TookOver {
         /// Time since a frame of the other MainDevice came last; `None` if none has come.
         silence: Option<Duration>,
@@ -35,7 +35,7 @@ pub enum StandbyEvent {
         /// A write into the memory of a SubDevice by the other MainDevice, which the takeover may have cut off.
         cut: Option<MemoryWrite>,
     },
-    /// What this MainDevice, as ACTIVE, knows of the other one has changed.
+    /// The state of the other MainDevice has changed, as determined by this one as ACTIVE.
     Partner(Partner),
     /// A frame of another MainDevice came while this one is ACTIVE (protocol MR-10).
     Collision {

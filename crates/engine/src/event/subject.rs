@@ -1,4 +1,4 @@
-//! Subjects of events, and sets of them: what a client of events asks for.
+//! Subjects of events, and sets of them: what a client of events subscribes to.
 
 use ringcat_wire::address::Position;
 

@@ -4,7 +4,7 @@
 //! steers a clock (the reference towards the host, on the other copy a second reference towards the first), and a BRD
 //! of 0x092C. The supervisor posts on the board which reference each copy distributes. The FRMW leaves with the
 //! predicted time of the reference: SubDevices that process it before the reference, or without one, take this
-//! prediction. When ports have changed, or a ring has closed, no time is distributed until the supervisor knows the new
+//! prediction. When ports have changed, or a ring has closed, no time is distributed until the supervisor has the new
 //! delays.
 
 use ringcat_wire::address::{RegisterAddress, StationAddress, Wkc};
@@ -159,7 +159,7 @@ enum WantedTime {
     Application(ReferenceTime),
 }
 
-/// State of the clocks as the exchange sees it.
+/// State of the clocks in the exchange.
 #[derive(Debug, Default)]
 pub(crate) struct Clocks {
     setup: ClockSetup,

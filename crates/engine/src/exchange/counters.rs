@@ -64,95 +64,46 @@ impl CyclicCounters {
     pub const fn missing(&self) -> u64 {
         self.lost.saturating_sub(self.lost_late).saturating_sub(self.lost_damaged)
     }
-
-    /// Number of counters.
-    pub const COUNT: usize = 18;
-
-    /// All counters, to hand them to another thread one by one.
-    pub const fn to_words(&self) -> [u64; CyclicCounters::COUNT] {
-        let CyclicCounters {
-            sent,
-            bytes,
-            received,
-            lost,
-            lost_late,
-            lost_damaged,
-            half,
-            copies_lost,
-            overtaken,
-            late,
-            corrupt,
-            foreign,
-            other,
-            skipped,
-            incomplete,
-            stale_copies,
-            sent_again,
-            saved,
-        } = *self;
-        [
-            sent,
-            bytes,
-            received,
-            lost,
-            lost_late,
-            lost_damaged,
-            half,
-            copies_lost,
-            overtaken,
-            late,
-            corrupt,
-            foreign,
-            other,
-            skipped,
-            incomplete,
-            stale_copies,
-            sent_again,
-            saved,
-        ]
-    }
-
-    /// The counters of [`CyclicCounters::to_words`].
-    pub const fn from_words(words: [u64; CyclicCounters::COUNT]) -> CyclicCounters {
-        let [
-            sent,
-            bytes,
-            received,
-            lost,
-            lost_late,
-            lost_damaged,
-            half,
-            copies_lost,
-            overtaken,
-            late,
-            corrupt,
-            foreign,
-            other,
-            skipped,
-            incomplete,
-            stale_copies,
-            sent_again,
-            saved,
-        ] = words;
-        CyclicCounters {
-            sent,
-            bytes,
-            received,
-            lost,
-            lost_late,
-            lost_damaged,
-            half,
-            copies_lost,
-            overtaken,
-            late,
-            corrupt,
-            foreign,
-            other,
-            skipped,
-            incomplete,
-            stale_copies,
-            sent_again,
-            saved,
-        }
-    }
 }
+
+/// The counters and their order as words, listed once. A counter that is not in the list is a compile error.
+macro_rules! as_words {
+    ($($counter:ident),+) => {
+        impl CyclicCounters {
+            /// Number of counters.
+            pub const COUNT: usize = [$(stringify!($counter)),+].len();
+
+            /// All counters, to hand them to another thread one by one.
+            pub const fn to_words(&self) -> [u64; CyclicCounters::COUNT] {
+                [$(self.$counter),+]
+            }
+
+            /// The counters of [`CyclicCounters::to_words`].
+            pub const fn from_words(words: [u64; CyclicCounters::COUNT]) -> CyclicCounters {
+                let [$($counter),+] = words;
+                CyclicCounters { $($counter),+ }
+            }
+        }
+    };
+}
+
+as_words!(
+    sent,
+    bytes,
+    received,
+    lost,
+    lost_late,
+    lost_damaged,
+    half,
+    copies_lost,
+    overtaken,
+    late,
+    corrupt,
+    foreign,
+    other,
+    skipped,
+    incomplete,
+    stale_copies,
+    sent_again,
+    saved
+);

@@ -54,7 +54,7 @@ impl Evidence {
             if let Some(seen) = frame.clocks_seen() {
                 self.clocks.observe(seen, frame.arrivals(), board, events);
             }
-            // Counts first: a reader that sees the change then finds the matching counts.
+            // Counts first: a reader that reads the change then finds the matching counts.
             if let Some(supervision) = frame.supervision() {
                 board.post_supervision(supervision);
             }

@@ -49,7 +49,7 @@ pub(crate) enum Unusable {
     Lengths(Lengths),
 }
 
-/// The master frames as the INACTIVE sees them.
+/// The master frames as received by the INACTIVE.
 #[derive(Debug)]
 pub(crate) struct Following {
     lengths: Lengths,

@@ -102,7 +102,7 @@ impl Exchange {
         self.standby.0.as_ref()?.collided_write
     }
 
-    /// Whether a link has a carrier, as the acyclic half knows it; `None` if the links do not report it.
+    /// Whether a link has a carrier, as posted by the acyclic half; `None` if the links do not report it.
     pub fn carrier(&self, link: Link) -> Option<bool> {
         self.board.live.carrier(link)
     }
@@ -112,7 +112,7 @@ impl Exchange {
         self.standby.0.as_ref().map_or(MainDeviceRole::Active, |state| state.role)
     }
 
-    /// What the ACTIVE knows of the other MainDevice.
+    /// State of the other MainDevice, as determined by the ACTIVE.
     pub fn partner(&self) -> Partner {
         self.standby.0.as_ref().map_or(Partner::Absent, |state| state.watch.partner())
     }

@@ -1,6 +1,6 @@
 //! How long a frame takes to come back, learned from its flights, and how long it is waited for.
 //!
-//! Input: times of departure and return as the host sees them. Output: the time after departure at which a frame that
+//! Input: times of departure and return as measured by the host. Output: the time after departure at which a frame that
 //! is not back is lost. This time is never shorter than the way of an open ring, which is up to twice the closed one,
 //! plus a margin. Nothing is known before the first flights.
 

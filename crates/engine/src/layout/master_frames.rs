@@ -37,7 +37,7 @@ pub struct MasterSizes {
     /// Whether the INACTIVE gets the inputs of the SubDevices.
     pub inputs: bool,
     /// Bytes of knowledge of the segment per cycle, at most `MOST_KNOWLEDGE`; rounded up to a multiple of 8. With 0
-    /// the INACTIVE learns nothing, and cannot take over without a scan.
+    /// the INACTIVE gets no knowledge, and cannot take over without a scan.
     pub knowledge: u16,
 }
 

@@ -39,7 +39,7 @@ pub(crate) struct InUse {
 }
 
 impl Mailbox {
-    /// What another process must know to go on with this mailbox; `None` if it is not in use.
+    /// What another process needs to continue with this mailbox; `None` if it is not in use.
     pub(crate) fn known(&self) -> Option<KnownMailbox> {
         let shared = self.shared();
         let (state, now) = (shared.state(), shared.bus.now());

@@ -1,7 +1,7 @@
 //! An application that follows the ACTIVE MainDevice of the ring: everything is prepared for a takeover, and nothing is
 //! sent (protocol 9.10).
 //!
-//! In: the declaration, the same as on the ACTIVE, and what that one knows of the segment. The layout of process data
+//! In: the declaration, the same as on the ACTIVE, and its knowledge of the segment. The layout of process data
 //! follows from both, and is that of the ACTIVE: the SubDevices keep their FMMUs.
 
 use alloc::rc::Rc;
@@ -43,7 +43,7 @@ impl MainDevice {
         Ok(active)
     }
 
-    /// Takes over what another MainDevice knows of the segment, as if a scan had found it.
+    /// Takes over the knowledge of another MainDevice about the segment, as if a scan had found it.
     fn assume(&mut self, knowledge: Knowledge) {
         self.supervisor.assume_ring(knowledge.ring);
         self.segment.observe(Observation::ScanBegun);
@@ -56,12 +56,12 @@ impl MainDevice {
         self.segment.observe(Observation::ScanEnded(Ok(scan)));
     }
 
-    /// The SubDevices as the ACTIVE knows them, to declare them; `None` before all of it has arrived.
+    /// The SubDevices in the knowledge of the ACTIVE, to declare them; `None` before all of it has arrived.
     pub fn heard_scan(&self) -> Option<Scan> {
         self.heard_knowledge().map(|knowledge| scan_of(&knowledge))
     }
 
-    /// From now on the model shows the states that the ACTIVE sees.
+    /// From now on the model shows the states reported by the ACTIVE.
     pub(super) fn begin_mirror(&mut self) {
         let (bus, segment) = (self.supervisor.bus(), self.segment.clone());
         self.supervisor.spawn(mirror(bus, segment, self.requests.clone()));

@@ -1,4 +1,4 @@
-//! An INACTIVE MainDevice without an application: it listens to the ACTIVE, and learns what it needs to follow
+//! An INACTIVE MainDevice without an application: it listens to the ACTIVE, and collects what it needs to follow
 //! (protocol 9.10).
 
 use ringcat_wire::master_frame::{Diagnosis, DomainRecord};
@@ -47,7 +47,7 @@ impl MainDevice {
         }
     }
 
-    /// What was heard of the ACTIVE while there is no application.
+    /// What has arrived from the ACTIVE while there is no application.
     pub fn heard(&self) -> Heard {
         let Some(standby) = &self.standby else { return Heard::default() };
         let at = standby.words.heard_at();

@@ -1,4 +1,4 @@
-//! Takes what an INACTIVE MainDevice without an application hears of the ACTIVE (protocol 9.10).
+//! Takes what an INACTIVE MainDevice without an application receives from the ACTIVE (protocol 9.10).
 //!
 //! It belongs to the thread that has the links of the master frames, which need not be that of the acyclic half: both
 //! share words.
@@ -16,7 +16,7 @@ use crate::knowledge::Knowledge;
 use crate::link::Link;
 use crate::time::Instant;
 
-/// What an INACTIVE MainDevice has heard of the ACTIVE.
+/// What an INACTIVE MainDevice has received from the ACTIVE.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Heard {
@@ -40,7 +40,7 @@ pub struct HeardDiagnosis {
     pub domains: Vec<DomainRecord>,
 }
 
-/// Takes what an INACTIVE MainDevice without an application hears of the ACTIVE, in any thread.
+/// Takes what an INACTIVE MainDevice without an application receives from the ACTIVE, in any thread.
 #[derive(Debug)]
 pub struct Listener {
     listening: Following,
@@ -64,7 +64,7 @@ impl Listener {
         }
     }
 
-    /// What was heard so far.
+    /// What has arrived so far.
     pub fn heard(&self) -> Heard {
         let newest = self.listening.newest().and_then(|(cycle, _)| self.listening.header_of(cycle));
         let period = |(Header { period_ns, .. }, _)| Duration::from_nanos(u64::from(period_ns));

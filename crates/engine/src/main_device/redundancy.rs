@@ -1,4 +1,4 @@
-//! MainDevice redundancy: the role, what was heard of the other MainDevice, and what it needs of this one.
+//! MainDevice redundancy: the role, what has arrived from the other MainDevice, and what it needs of this one.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -30,12 +30,6 @@ impl MainDevice {
     /// Session and digest of the configuration of the ACTIVE; `None` before a frame of it.
     pub fn heard_configuration(&self) -> Option<(u16, u64)> {
         self.standby.as_ref()?.words.header()
-    }
-
-    /// Digest of the configuration of the active application; `None` without one.
-    pub fn configuration_digest(&self) -> Option<u64> {
-        self.active()?;
-        Some(self.standby.as_ref()?.configuration.digest())
     }
 
     /// LRW is not allowed: the INACTIVE takes outputs from frames that have passed SubDevices (protocol REQ047).

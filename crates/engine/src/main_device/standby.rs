@@ -1,4 +1,4 @@
-//! What a MainDevice of two has: options, what both halves share, and the other MainDevice as this one knows it.
+//! Data of one of two MainDevices in a ring: options, what both halves share, and the state of the other MainDevice.
 
 use alloc::sync::Arc;
 
@@ -21,7 +21,7 @@ pub(super) struct Standby {
     pub configuration: Configuration,
     /// Session of the process data.
     pub session: Option<u32>,
-    /// Takes what is heard of the ACTIVE without an application, unless another thread does.
+    /// Takes what arrives from the ACTIVE without an application, unless another thread does.
     pub listener: Option<Listener>,
     /// A version of the ACTIVE that cannot be read, and was reported.
     pub other_version: Option<u8>,

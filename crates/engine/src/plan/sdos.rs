@@ -92,14 +92,14 @@ impl PdoPlan {
         let object = self.object();
         let mut sdos = Vec::new();
         if is_assigned {
-            sdos.push(download(object, 0, [0]));
+            sdos.push(SdoDownload::new(object, 0, [0]));
         }
         changed.iter().for_each(|pdo| map(pdo, &mut sdos));
         if is_assigned {
             for (sub_index, pdo) in (1..=u8::MAX).zip(&self.wanted.pdos) {
-                sdos.push(download(object, sub_index, pdo.index.to_le_bytes()));
+                sdos.push(SdoDownload::new(object, sub_index, pdo.index.to_le_bytes()));
             }
-            sdos.push(download(object, 0, [self.wanted.pdos.len() as u8]));
+            sdos.push(SdoDownload::new(object, 0, [self.wanted.pdos.len() as u8]));
         }
         sdos
     }
@@ -107,14 +107,10 @@ impl PdoPlan {
 
 fn map(pdo: &PdoMapping, sdos: &mut Vec<SdoDownload>) {
     let entries = pdo.entries.as_deref().unwrap_or_default();
-    sdos.push(download(pdo.index, 0, [0]));
+    sdos.push(SdoDownload::new(pdo.index, 0, [0]));
     for (sub_index, entry) in (1..=u8::MAX).zip(entries) {
         let object = u32::from(entry.index) << 16 | u32::from(entry.sub_index) << 8 | u32::from(entry.bit_length);
-        sdos.push(download(pdo.index, sub_index, object.to_le_bytes()));
+        sdos.push(SdoDownload::new(pdo.index, sub_index, object.to_le_bytes()));
     }
-    sdos.push(download(pdo.index, 0, [entries.len() as u8]));
-}
-
-fn download(index: u16, sub_index: u8, data: impl Into<Vec<u8>>) -> SdoDownload {
-    SdoDownload { index, sub_index, complete_access: false, data: data.into() }
+    sdos.push(SdoDownload::new(pdo.index, 0, [entries.len() as u8]));
 }

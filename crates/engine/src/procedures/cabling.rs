@@ -1,8 +1,8 @@
 //! Crossed lines in operation (protocol 9.5): after each change of ports the segment is scanned again, and each
 //! SubDevice that frames enter at another port than 0 is reported once.
 //!
-//! Unknown rings behind junctions are reported too: an application with junction redundancy must know that one of them
-//! is not monitored.
+//! Unknown rings behind junctions are reported too: an application with junction redundancy needs the information that
+//! one of them is not monitored.
 //!
 //! One scan is no proof: cables that are cut and healed within milliseconds, and lost frames, make a straight ring seem
 //! crossed. So a scan counts only if the segment was the same before and after it, and a new finding is reported only
@@ -55,7 +55,7 @@ pub(super) trait Known {
     fn are_measuring(&self) -> bool;
     /// A more urgent disturbance waits until the redundant link is up.
     fn is_outranked(&self) -> bool;
-    /// The model, which knows the link that is down on purpose.
+    /// The model, which has the link that is down on purpose.
     fn segment(&self) -> &SharedSegment;
 }
 

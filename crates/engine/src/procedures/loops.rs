@@ -76,8 +76,8 @@ pub(super) fn write_of((station, control): (StationAddress, DlControl)) -> (Comm
     (Command::Fpwr, Target::Station(station, map::DL_CONTROL), control.encode()[..WRITTEN].to_vec())
 }
 
-/// Restores what the model knows to be changed, if anything is. All in one frame: behind one end of a ring that is open
-/// again, frames are lost until the other end is open too.
+/// Restores what is changed according to the model, if anything is. All in one frame: behind one end of a ring that is
+/// open again, frames are lost until the other end is open too.
 pub(crate) async fn restore(bus: &Bus, segment: &SharedSegment) {
     for _ in 0..TRIES {
         let altered = segment.view().altered();

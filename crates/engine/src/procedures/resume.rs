@@ -1,4 +1,4 @@
-//! Goes on with a segment that another process knows, without a scan (decision 0061).
+//! Continues with the knowledge of another process about the segment, without a scan (decision 0061).
 //!
 //! First one round of reads, before anything is written: number of SubDevices, and of each its station address, its
 //! controller, its ports, its AL status and its mailbox SyncManagers. Where all is as known, nothing else is read.

@@ -275,7 +275,7 @@ async fn identify(
 }
 
 pub(crate) fn node_status(info: &SubDeviceInfo) -> NodeStatus {
-    NodeStatus { dl_status: info.dl_status, receive_times: info.receive_times, ports: info.controller.ports }
+    NodeStatus::from(info)
 }
 
 /// Sets the same initial state in all: loops automatic, aliases off, event mask, no FMMU, no SyncManager, no clock

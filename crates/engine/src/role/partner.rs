@@ -1,4 +1,4 @@
-//! The other MainDevice of a ring, as the ACTIVE sees it.
+//! State of the other MainDevice of a ring, as determined by the ACTIVE.
 
 use core::fmt;
 

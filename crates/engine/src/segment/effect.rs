@@ -77,7 +77,7 @@ pub enum Watch {
     Statistics,
     /// Without an application: broadcasts.
     Idle,
-    /// Tells when attempts of undeclared SubDevices are due.
+    /// Reports when attempts of undeclared SubDevices are due.
     Undeclared,
     /// Reads the mail status of undeclared SubDevices.
     UndeclaredMail,

@@ -190,7 +190,7 @@ pub enum Observation<'a> {
     Compared(DeclarationFinding),
     /// An application declares SubDevices.
     Activated(Box<Declared>),
-    /// Both halves know the declaration: the procedures of the application begin. The configuration begins at once, or
+    /// Both halves have the declaration: the procedures of the application begin. The configuration begins at once, or
     /// with clocks when they are set up: an answer meanwhile is not a return.
     Attached,
     /// The application ends. The result of the scan stays.

@@ -74,7 +74,7 @@ fn ring_rules() -> Rules<'static> {
     Rules { links: LinkSet::Ring, supervision: true, lrw, witnesses: &[], session: 0, max_datagrams: None }
 }
 
-/// Choices of an application that wants nothing special.
+/// Choices of an application with default options.
 fn choices() -> Choices {
     Choices {
         enhanced_line_crossed: false,
@@ -399,7 +399,7 @@ fn without_changes_the_model_sleeps_until_the_next_routine_scan() {
     assert!(wake > ring.now + Duration::from_millis(900), "an evaluation at {wake:?}, now {:?}", ring.now);
 }
 
-/// Evaluates the same words whenever the model asks for it, for a second; returns how often. Rounds end at once.
+/// Evaluates the same words whenever the model requests it, for a second; returns how often. Rounds end at once.
 fn evaluations_without_news(ring: &mut Ring, high: &[u8]) -> usize {
     let (words, end) = (ring.words.words(), ring.now + Duration::from_secs(1));
     let mut count = 0;

@@ -62,7 +62,7 @@ impl Bus {
         self.shared.borrow().links
     }
 
-    /// State of the ring: as the exchange sees it once it runs, before that as acyclic frames show it.
+    /// State of the ring: from the exchange once it runs, before that as acyclic frames show it.
     pub fn ring(&self) -> RingState {
         let shared = self.shared.borrow();
         match shared.board.as_ref().map(|board| board.ring().state) {

@@ -115,13 +115,13 @@ mod tests {
     #[test]
     fn a_flood_of_addresses_is_bounded_and_no_datagram_is_forgotten() {
         let mut reports = CommandReports::default();
-        let mut told = 0;
+        let mut reported = 0;
         for step in 0..10_000_u64 {
-            told += reports.note(read(step as u16, 0), Instant(step * 1000)).map_or(0, |wrong| wrong.count);
+            reported += reports.note(read(step as u16, 0), Instant(step * 1000)).map_or(0, |wrong| wrong.count);
             assert!(reports.kinds.len() <= MOST);
         }
         let waiting = reports.take_waiting(Instant(INTERVAL.as_nanos() as u64 * 2));
         assert!(waiting.len() <= MOST + 1);
-        assert_eq!(told + waiting.iter().map(|wrong| wrong.count).sum::<u32>(), 10_000);
+        assert_eq!(reported + waiting.iter().map(|wrong| wrong.count).sum::<u32>(), 10_000);
     }
 }

@@ -1,4 +1,8 @@
 //! Waits for words that the cyclic half and the links post, instead of polling them.
+//!
+//! Packed words are compared here for equality, only to wake the tasks that wait: nothing is decided, and a change may
+//! turn out to be none for the model. The fields of the words are evaluated in `segment/words.rs` alone; the supervisor
+//! may not name the model, which is above it (decision 0153).
 
 use core::future::poll_fn;
 use core::task::Poll;

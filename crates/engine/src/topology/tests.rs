@@ -169,10 +169,6 @@ fn connections_are_found_and_displayed_by_subdevice_and_port() {
     let topology = Topology::build(&[status(PASS), status(PASS), status(END)], 3);
     let connection = Connection { near: at(1, 1), far: at(2, 0) };
     assert_eq!(topology.connection_to(Position(2)), Some(connection));
-    assert_eq!(topology.connection_between(Position(2), Position(1)), Some(connection));
-    assert_eq!(topology.connection_at(at(1, 1)), Some(connection));
-    assert_eq!(topology.connection_at(at(2, 0)), Some(connection));
-    assert_eq!(topology.connection_at(at(2, 1)), None);
     assert_eq!(connection.to_string(), "between SubDevice 1 port 1 and SubDevice 2 port 0");
 }
 

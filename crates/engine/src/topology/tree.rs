@@ -110,22 +110,4 @@ impl Topology {
         let far = PortOf { node, port: here.entry_port };
         Some(Connection { near: PortOf { node: parent, port }, far })
     }
-
-    /// The cable on a port.
-    pub fn connection_at(&self, at: PortOf) -> Option<Connection> {
-        let here = self.nodes.get(at.node)?;
-        match here.children.get(usize::from(at.port))? {
-            Some(child) => self.cable_to(*child),
-            None if here.entry_port == at.port => self.cable_to(at.node),
-            None => None,
-        }
-    }
-
-    /// The cable between two SubDevices, in either order.
-    pub fn connection_between(&self, one: Position, other: Position) -> Option<Connection> {
-        let between = |from: Position, to: Position| {
-            self.connection_to(to).filter(|connection| connection.near.position() == from)
-        };
-        between(one, other).or_else(|| between(other, one))
-    }
 }

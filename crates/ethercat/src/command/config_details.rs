@@ -122,7 +122,7 @@ mod tests {
 
     // covers: daemon
     #[test]
-    fn everything_that_is_declared_is_told() {
+    fn everything_that_is_declared_is_listed() {
         let line = DeclaredLine {
             alias: 1000,
             identity: [2, 3],

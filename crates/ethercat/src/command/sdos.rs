@@ -123,7 +123,7 @@ mod tests {
 
     // covers: daemon
     #[test]
-    fn rights_and_types_of_entries_are_told() {
+    fn rights_and_types_of_entries_are_listed() {
         let entry = |data_type, access| EntryLine { sub_index: 1, data_type, bits: 32, access, name: "x".to_owned() };
         assert_eq!(line(0x1018, &entry(7, 0b001_111)), "  0x1018:01, rwr-r-, uint32, 32 bit, \"x\"\n");
         assert_eq!(line(0x1018, &entry(0x800, 0b110_000)), "  0x1018:01, ---w-w, type 0800, 32 bit, \"x\"\n");

@@ -111,11 +111,11 @@ pub struct Port {
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Mailboxes {
-    /// Address of that which the MainDevice writes
+    /// Address of the mailbox that the MainDevice writes
     pub receive_address: u16,
     /// Its length, in bytes
     pub receive_bytes: u16,
-    /// Address of that which the MainDevice reads
+    /// Address of the mailbox that the MainDevice reads
     pub send_address: u16,
     /// Its length, in bytes
     pub send_bytes: u16,

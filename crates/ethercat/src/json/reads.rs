@@ -112,7 +112,7 @@ pub struct Sii<'a> {
 pub struct Category<'a> {
     /// Number of the category
     pub category: u16,
-    /// Its name in the text, such as `TXPDO`; `unknown` for those that the tool does not know
+    /// Its name in the text, such as `TXPDO`; `unknown` for those unknown to the tool
     pub name: &'static str,
     /// Its bytes without number and length, in hexadecimal digits
     pub data: Hex<'a>,

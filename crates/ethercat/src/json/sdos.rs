@@ -39,7 +39,7 @@ pub struct Object<'a> {
 pub struct Entry<'a> {
     /// Sub-index of the entry
     pub subindex: u8,
-    /// Name of its data type, as `--type` takes it; null for a type that the tool does not know
+    /// Name of its data type, as `--type` takes it; null for a type unknown to the tool
     pub data_type: Option<&'static str>,
     /// Number of its data type
     pub data_type_code: u16,

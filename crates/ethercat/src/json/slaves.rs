@@ -50,7 +50,7 @@ pub struct SubDevice<'a> {
     pub revision: u32,
     /// Serial number
     pub serial: u32,
-    /// What else is known of it; null without --verbose
+    /// Further data of it; null without --verbose
     pub details: Option<Details<'a>>,
 }
 

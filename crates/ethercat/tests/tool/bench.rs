@@ -298,7 +298,7 @@ impl Driver {
         Counts { cycles, incomplete, late, skipped }
     }
 
-    /// Ends it; what it tells of its cycles.
+    /// Ends it; returns what it reports about its cycles.
     pub fn end(mut self) -> String {
         self.is_over.store(true, Ordering::Relaxed);
         self.thread.take().map(|thread| thread.join().expect("no panic")).unwrap_or_default()

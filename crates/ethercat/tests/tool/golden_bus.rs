@@ -1,5 +1,5 @@
 //! The ring that the outputs of the original tool show: a coupler, an analogue input with a mailbox, a digital output,
-//! and a SubDevice whose SII tells nothing and that refuses PREOP.
+//! and a SubDevice whose SII has no information and that refuses PREOP.
 
 use std::path::Path;
 

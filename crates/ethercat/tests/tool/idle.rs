@@ -195,7 +195,7 @@ fn counters_of_errors_are_shown_and_reset() {
 
 // covers: daemon
 #[test]
-fn a_master_tells_its_frames_and_dictionaries_their_objects() {
+fn a_master_lists_its_frames_and_dictionaries_their_objects() {
     let bench = bench();
     let master = bench.good(&["master"]);
     assert!(master.starts_with("Master0\n  Phase: Idle\n  Active: no\n  Slaves: 4\n  Ethernet devices:\n    Main: "));
@@ -239,7 +239,7 @@ fn without_a_daemon_the_message_says_what_to_start() {
 
 // covers: daemon
 #[test]
-fn ip_parameters_are_set_where_the_slave_speaks_ethernet() {
+fn ip_parameters_are_set_where_the_slave_supports_ethernet() {
     let text = "[segment]\n[[device]]\ntype = \"ethernet-terminal\"\n[[device]]\ntype = \"digital-input-8\"\n";
     let segment = Segment::from_toml(text, Path::new(".")).expect("it is right");
     let bench = Bench::start(vec![segment]);

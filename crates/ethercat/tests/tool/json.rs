@@ -178,7 +178,7 @@ fn commands_that_print_nothing_refuse_json_and_change_nothing() {
 
 // covers: daemon, json
 #[test]
-fn an_application_is_told_in_json() {
+fn an_application_is_listed_in_json() {
     let bench = bench();
     let _driver = Driver::start(&bench, declare);
     bench.wait_until("a full working counter", || bench.good(&["domains"]).contains("WorkingCounter 3/3\n"));

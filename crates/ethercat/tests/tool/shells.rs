@@ -70,5 +70,5 @@ fn scripts_and_pages_are_taken_by_their_programs() {
         assert!(takes("groff", &["-man", "-Tutf8", "-ww", "-z"], &path), "{page}");
         assert!(takes("mandoc", &["-Tlint", "-Wwarning"], &path), "{page}");
     }
-    std::fs::remove_dir_all(directory).expect("it is ours");
+    std::fs::remove_dir_all(directory).expect("it is writable");
 }

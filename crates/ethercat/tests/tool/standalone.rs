@@ -52,7 +52,7 @@ fn commands_work_on_a_simulated_segment_without_a_daemon() {
     assert!(run(&["events"]).lines().count() > 0);
     // Nothing is started for it.
     assert!(tool(Path::new(NOWHERE), &["version", "--sim", "/none"]).out.starts_with("IgH EtherCAT master 1.6.6"));
-    std::fs::remove_dir_all(directory).expect("it is ours");
+    std::fs::remove_dir_all(directory).expect("it is writable");
 }
 
 // covers: daemon
@@ -67,7 +67,7 @@ fn a_command_without_a_daemon_leaves_nothing_behind() {
     assert!(command.status().expect("it starts").success());
     let left: Vec<_> = std::fs::read_dir(&directory).expect("it is there").flatten().map(|it| it.file_name()).collect();
     assert_eq!(left, ["segment.toml"]);
-    std::fs::remove_dir_all(directory).expect("it is ours");
+    std::fs::remove_dir_all(directory).expect("it is writable");
 }
 
 /// Processes that have this text in their command line.
@@ -116,7 +116,7 @@ fn a_command_that_a_signal_ends_leaves_neither_files_nor_a_daemon_behind() {
         let left: Vec<_> =
             std::fs::read_dir(&directory).expect("it is there").flatten().map(|it| it.file_name()).collect();
         assert_eq!(left, ["segment.toml"], "{signal}");
-        std::fs::remove_dir_all(directory).expect("it is ours");
+        std::fs::remove_dir_all(directory).expect("it is writable");
     }
 }
 
@@ -141,7 +141,7 @@ fn states_without_a_daemon_are_reached_when_the_command_ends() {
     let (done, _) = run(&["states", "-p0", "BOOT"]);
     assert_eq!(done.code, Some(1), "{done:?}");
     assert!(done.err.contains("position 0") && done.err.contains("no mailboxes for BOOT"), "{done:?}");
-    std::fs::remove_dir_all(directory).expect("it is ours");
+    std::fs::remove_dir_all(directory).expect("it is writable");
 }
 
 /// A network namespace with both ends of a cable that no segment is at; it is removed at the end.
@@ -201,7 +201,7 @@ fn a_reader_that_closes_its_end_ends_a_command_that_follows_events() {
         assert!(begin.elapsed() < LONG, "it goes on");
         std::thread::sleep(Duration::from_millis(5));
     }
-    std::fs::remove_dir_all(directory).expect("it is ours");
+    std::fs::remove_dir_all(directory).expect("it is writable");
 }
 
 // covers: daemon
@@ -216,7 +216,7 @@ fn an_output_that_cannot_be_written_is_named() {
     assert_eq!(output.status.code(), Some(1));
     let text = String::from_utf8_lossy(&output.stderr);
     assert!(text.starts_with("Failed to write the output: No space left on device"), "{text}");
-    std::fs::remove_dir_all(directory).expect("it is ours");
+    std::fs::remove_dir_all(directory).expect("it is writable");
 }
 
 // covers: daemon
@@ -244,7 +244,7 @@ fn a_segment_file_may_have_any_name_but_must_be_a_file_with_devices() {
         let (code, said) = run(file);
         assert!(code == Some(1) && said.ends_with(text), "{file}: {code:?} {said}");
     }
-    std::fs::remove_dir_all(directory).expect("it is ours");
+    std::fs::remove_dir_all(directory).expect("it is writable");
 }
 
 // covers: daemon
@@ -259,7 +259,7 @@ fn a_long_path_for_temporary_files_is_no_obstacle() {
     let mut command = Command::new(PROGRAM);
     let output = command.args(["slaves", "--sim", &file]).env("TMPDIR", &long).output().expect("it starts");
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
-    std::fs::remove_dir_all(directory).expect("it is ours");
+    std::fs::remove_dir_all(directory).expect("it is writable");
 }
 
 // covers: daemon

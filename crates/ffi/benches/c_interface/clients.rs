@@ -50,7 +50,7 @@ impl Crowd {
         }
     }
 
-    /// Runs something beside the clients; it tells them when to begin.
+    /// Runs something beside the clients; it signals them to begin.
     fn beside<T>(bench: &Bench, is_there: bool, work: impl FnOnce(&AtomicBool) -> T) -> (T, u64, u64) {
         let crowd = Crowd::default();
         let result = std::thread::scope(|scope| {

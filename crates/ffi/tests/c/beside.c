@@ -1,5 +1,5 @@
 /*
- * A master that is opened beside the one that drives it: beside ask prints what a handle is told that was opened only;
+ * A master that is opened beside the one that drives it: beside ask prints what a handle gets that was opened only;
  * beside drive brings a drive to OP, prints "op", then the same from a second handle of its own process, and goes on
  * until its input ends. Lines that begin with "state" change with the states of the SubDevices.
  */

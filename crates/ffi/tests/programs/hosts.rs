@@ -25,7 +25,7 @@ fn a_program_that_locks_its_memory_needs_at_most_6_mib_for_the_library() {
 
 // covers: c-interface
 #[test]
-fn a_program_with_too_little_memory_to_lock_is_told_which_limit_to_set() {
+fn a_program_with_too_little_memory_to_lock_gets_the_limit_to_set() {
     let Some(hosts) = program(&here().join("tests/c/hosts.c"), &[]) else { return };
     for mib in ["1", "2", "3", "4", "5"] {
         let (said, reported, status) = outputs(&hosts, &here().join("tests/c/services.toml"), &["locked", mib]);

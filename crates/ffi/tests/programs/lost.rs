@@ -9,7 +9,7 @@ use crate::library::{here, program, workshop};
 
 // covers: c-interface, daemon
 #[test]
-fn a_stopped_program_is_told_the_loss_of_its_bus_and_requests_it_again() {
+fn a_stopped_program_gets_the_loss_of_its_bus_and_requests_it_again() {
     let Some(stopped) = program(&here().join("tests/c/stopped.c"), &[]) else { return };
     let segment = workshop().join("stopped.toml");
     std::fs::write(&segment, "[segment]\n[[device]]\ntype = \"digital-output-8\"\n").expect("it can be written");

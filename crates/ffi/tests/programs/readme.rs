@@ -31,7 +31,7 @@ fn script(path: &Path, text: &str) {
     let written = path.with_extension("text");
     fs::write(&written, format!("#!/bin/sh\n{text}\n")).expect("it can be written");
     assert!(copy_program(&written, path));
-    fs::set_permissions(path, fs::Permissions::from_mode(0o755)).expect("it is ours");
+    fs::set_permissions(path, fs::Permissions::from_mode(0o755)).expect("it is writable");
 }
 
 /// A directory with what the commands expect in the repository; `None` if the programs are not built.
@@ -62,7 +62,7 @@ fn place(prefix: &Path) -> Option<PathBuf> {
         }
     }
     for directory in [&place, &examples] {
-        fs::set_permissions(directory, fs::Permissions::from_mode(0o777)).expect("it is ours");
+        fs::set_permissions(directory, fs::Permissions::from_mode(0o777)).expect("it is writable");
     }
     Some(place)
 }

@@ -50,7 +50,7 @@ pub enum NoAnswer {
 impl fmt::Display for NoAnswer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            NoAnswer::NotSupported => f.write_str("the driver does not tell"),
+            NoAnswer::NotSupported => f.write_str("the driver does not report it"),
             NoAnswer::Failed(errno) => write!(f, "the driver answers: {}", io::Error::from_raw_os_error(*errno)),
         }
     }

@@ -10,7 +10,7 @@ use crate::monotonic;
 use crate::receive_mode::ReceiveMode;
 use crate::rx_ring::{self, RxRing};
 
-/// What a process must know to go on with a socket, beside its descriptor.
+/// What a process needs to continue with a socket, beside its descriptor.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HandedSocket {
     /// Name of the interface to which it is bound.
@@ -27,7 +27,7 @@ pub struct HandedSocket {
 }
 
 impl PacketSocket {
-    /// What another process must know to go on with this socket. This process must not receive from it any more.
+    /// What another process needs to continue with this socket. This process must not receive from it any more.
     pub fn handed(&self) -> HandedSocket {
         HandedSocket {
             interface: self.interface.clone(),

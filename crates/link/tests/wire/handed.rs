@@ -171,8 +171,8 @@ fn a_killed_owner_leaves_a_ring_that_the_next_one_reads_on() {
             let (count, _) = descriptors::receive(&stream, &mut [0; 1]).expect("it reads");
             assert_eq!(count, 1, "the owner reads each frame");
         }
-        owner.kill().expect("it is ours");
-        owner.wait().expect("it is ours");
+        owner.kill().expect("it is writable");
+        owner.wait().expect("it is writable");
         let before = send(&mut far, read..read + round);
         std::thread::sleep(Duration::from_millis(5));
         // What it had not reported it has not read; where it was is found.
@@ -181,6 +181,6 @@ fn a_killed_owner_leaves_a_ring_that_the_next_one_reads_on() {
         let after = send(&mut far, read + round..read + round + 3);
         frames.extend(take_searching(&mut next, 3));
         assert_eq!(frames, [before, after].concat(), "round {round}");
-        fs::remove_file(&path).expect("it is ours");
+        fs::remove_file(&path).expect("it is writable");
     }
 }

@@ -15,7 +15,7 @@ use crate::of_two::OfTwo;
 use crate::standby::Reads;
 use crate::standby::policy::{Policy, Situation, Watch};
 
-/// The exchange of an INACTIVE, and when it has heard the other MainDevice.
+/// The exchange of an INACTIVE, and when the last frame of the other MainDevice arrived.
 struct Following<'a> {
     exchange: &'a mut Exchange,
     heard_at: &'a mut Option<Instant>,
@@ -92,7 +92,7 @@ impl Cyclic {
         let Cyclic { exchange, of_two, .. } = self;
         let Some(watch) = &mut of_two.watch else { return };
         if Link::ALL.iter().all(|link| exchange.carrier(*link) == Some(false)) {
-            // Nothing can be heard: listening begins when a link is back.
+            // No frame can arrive: listening begins when a link is up again.
             (of_two.inactive_since, of_two.heard_at) = (now, None);
         }
         let situation = Situation {

@@ -19,7 +19,7 @@ pub enum DaemonError {
     Client(ClientError),
     /// The links cannot be used.
     Links(LinkError),
-    /// What the daemon knows cannot be used.
+    /// The knowledge of the daemon cannot be used.
     Knowledge(KnowledgeError),
     /// The MainDevice reports an error.
     Bus(Error),
@@ -37,7 +37,7 @@ impl fmt::Display for DaemonError {
         match self {
             DaemonError::Client(error) => error.fmt(f),
             DaemonError::Links(error) => error.fmt(f),
-            DaemonError::Knowledge(error) => write!(f, "what ringcatd knows of the segment: {error}"),
+            DaemonError::Knowledge(error) => write!(f, "knowledge of ringcatd about the segment: {error}"),
             DaemonError::Bus(error) => error.fmt(f),
             DaemonError::Lost => f.write_str("ringcatd has ended, or does not answer"),
             DaemonError::TakenBack { cause } => write!(f, "ringcatd has taken the bus back before: {cause}"),

@@ -92,7 +92,7 @@ mod tests {
 
     // covers: daemon, eoe-interfaces
     #[test]
-    fn an_interface_that_is_not_there_is_ordered_once_and_a_refusal_is_told_once() {
+    fn an_absent_interface_is_ordered_once_and_a_refusal_is_reported_once() {
         let orders = Orders::new().expect("there are descriptors");
         let handed = HandedInterfaces::new(Vec::new(), orders.clone());
         let mac = [2, 0, 0, 0, 0, 1];

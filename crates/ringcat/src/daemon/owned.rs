@@ -34,7 +34,7 @@ use crate::supervisor_thread::SupervisorThread;
 const RELEASE: Duration = Duration::from_secs(2);
 /// Interval of checks for its answer.
 const PAUSE: Duration = Duration::from_micros(200);
-/// Events of scans that are kept between two looks: one is enough to tell that there were any.
+/// Events of scans that are kept between two checks: one is enough to show that there were any.
 const KEPT: usize = 1;
 
 /// A bus that a daemon has handed over. It is given back by [`OwnedBus::release`], or when this is dropped.
@@ -43,7 +43,7 @@ pub struct OwnedBus {
     supervisor: SupervisorThread,
     pub(super) scan: Option<Scan>,
     handed: HandedLinks,
-    /// A daemon that is started anew sees by it that this process has the bus.
+    /// A daemon that is started anew detects by it that this process has the bus.
     _lock: Option<OwnedFd>,
     links: Option<DaemonLinks>,
     _ethernet: Ethernet,
@@ -57,7 +57,7 @@ pub struct OwnedBus {
 impl OwnedBus {
     /// Takes the bus of a master from the daemon at this socket. `program` is the name with which the daemon names this
     /// process to others; `prepare` runs first in each thread: that of the acyclic half, and those for
-    /// questions of the daemon. Returns when the SubDevices were found as the daemon knows them; no SII is read.
+    /// questions of the daemon. Returns when the SubDevices were found in the knowledge of the daemon; no SII is read.
     ///
     /// # Errors
     /// [`DaemonError::is_no_daemon`]: none answers. The daemon refuses: there is no such master, another process drives
@@ -124,7 +124,7 @@ impl OwnedBus {
         Ok(OwnedBus { supervisor, scan, handed, _lock, links, _ethernet, connection, ownership, receiver, process })
     }
 
-    /// The acyclic half. It knows the SubDevices that the daemon knew.
+    /// The acyclic half. It has the SubDevices in the knowledge of the daemon.
     pub fn supervisor(&self) -> &SupervisorThread {
         &self.supervisor
     }

@@ -27,7 +27,7 @@ pub(super) struct Received {
     pub cyclic: DaemonLinks,
     /// Links of the acyclic half.
     pub acyclic: DaemonLinks,
-    /// A daemon that is started anew sees by it that this process has the bus.
+    /// A daemon that is started anew detects by it that this process has the bus.
     pub lock: Option<OwnedFd>,
     /// Network interfaces of EoE.
     pub interfaces: Vec<OwnedFd>,
@@ -36,7 +36,7 @@ pub(super) struct Received {
 }
 
 impl Received {
-    /// Asks for the bus of a master, and waits for it. Its links order what they cannot do themselves.
+    /// Requests the bus of a master, and waits for it. Its links order what they cannot do themselves.
     ///
     /// # Errors
     /// The daemon refuses or gives no answer, or what it has sent cannot be used.

@@ -1,4 +1,4 @@
-//! The thread that receives messages of the daemon to an owner, and sends what the owner knows and needs.
+//! The thread that receives messages of the daemon to an owner, and sends the knowledge and the orders of the owner.
 
 use std::os::fd::{AsFd, OwnedFd};
 use std::sync::Arc;
@@ -96,7 +96,7 @@ impl Receiver {
         true
     }
 
-    /// Tells the daemon what is known, if a scan has ended since the last time.
+    /// Sends the daemon the knowledge, if a scan has ended since the last time.
     fn tell_knowledge(&self) {
         let Some(events) = self.events else { return };
         match self.supervisor.client_events(events) {

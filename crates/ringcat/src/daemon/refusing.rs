@@ -54,7 +54,7 @@ fn of_mailbox(error: &MailboxError) -> ServiceFault {
     match error {
         MailboxError::TooLong { .. } => ServiceFault::TooLong,
         MailboxError::Full { .. } | MailboxError::NoAnswer { .. } => ServiceFault::NoAnswer,
-        // The SubDevice does not know the protocol, or not in this form.
+        // The SubDevice does not support the protocol, or not in this form.
         MailboxError::Error(_) => ServiceFault::NoProtocol,
         _ => ServiceFault::Other,
     }

@@ -40,7 +40,7 @@ const PORT: u8 = 0;
 /// The question is wrong, or it failed.
 pub(super) fn answer(supervisor: &SupervisorThread, ask: ToolQuery, bytes: Vec<u8>) -> Answered {
     let at = |position: u16| subdevice(supervisor, position);
-    let told = match ask {
+    let answered = match ask {
         ToolQuery::Master => master::report(supervisor).map(|report| ToolAnswer::Master(Box::new(report))),
         ToolQuery::SubDevices { from } => subdevices::list(supervisor, from).map(ToolAnswer::SubDevices),
         ToolQuery::Description { position } => {
@@ -60,7 +60,7 @@ pub(super) fn answer(supervisor: &SupervisorThread, ask: ToolQuery, bytes: Vec<u
         ToolQuery::Ethernet => master::ethernet(supervisor).map(ToolAnswer::Ethernet),
         other => return act(supervisor, other, bytes),
     };
-    told.map(|answer| (Answer::Tool(answer), Vec::new())).map_err(|error| refusal(&error))
+    answered.map(|answer| (Answer::Tool(answer), Vec::new())).map_err(|error| refusal(&error))
 }
 
 /// What reads or writes data.
@@ -76,7 +76,7 @@ fn act(supervisor: &SupervisorThread, ask: ToolQuery, bytes: Vec<u8>) -> Answere
         ToolQuery::UrgentWrite { position, address } => return write_urgently(supervisor, position, address, bytes),
         ToolQuery::SetIp { position, ip } => return set_ip(supervisor, position, ip),
         ToolQuery::SetDebugLevel { level } => supervisor.set_log_filter(LogFilter::new(LogLevel::from_number(level))),
-        _ => return Err(expected("a question that this version knows")),
+        _ => return Err(expected("a question of this version")),
     };
     finished(done)
 }

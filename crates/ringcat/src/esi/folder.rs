@@ -182,7 +182,7 @@ mod tests {
         }
 
         fn write(&self, name: &str, text: &str) {
-            fs::write(self.0.join("descriptions").join(name), text).expect("it is ours");
+            fs::write(self.0.join("descriptions").join(name), text).expect("it is writable");
         }
 
         fn open(&self) -> EsiFolder {
@@ -225,7 +225,7 @@ mod tests {
         place.write("one.xml", &description(1, "first, with another length"));
         place.write("three.xml", &description(3, "third"));
         assert_eq!(read(&place), (2, 3));
-        fs::remove_file(place.0.join("descriptions/more/two.XML")).expect("it is ours");
+        fs::remove_file(place.0.join("descriptions/more/two.XML")).expect("it is writable");
         assert_eq!(read(&place), (0, 2));
         let folder = place.open();
         let found = folder.index().find(71, 3, 1, false).expect("it is described");
@@ -254,13 +254,13 @@ mod tests {
         place.write("d.xml", dictionary);
         assert_eq!(opened(&place), (2, 2, Vec::new()), "it and the file that refers to it");
         assert_eq!(opened(&place), (0, 2, Vec::new()));
-        fs::create_dir_all(place.0.join("descriptions/more/sub")).expect("it is ours");
+        fs::create_dir_all(place.0.join("descriptions/more/sub")).expect("it is writable");
         place.write("more/sub/e.dict", dictionary);
         assert_eq!(opened(&place), (1, 2, Vec::new()), "one that was not there");
         assert_eq!(opened(&place), (0, 2, Vec::new()));
         place.write("more/sub/e.dict", "<EtherCATDict/>");
         assert_eq!(opened(&place).1, 1, "a description that was accepted depends on it too");
-        fs::remove_file(place.0.join("descriptions/more/sub/e.dict")).expect("it is ours");
+        fs::remove_file(place.0.join("descriptions/more/sub/e.dict")).expect("it is writable");
         assert_eq!(opened(&place), (1, 2, Vec::new()));
     }
 
@@ -290,11 +290,11 @@ mod tests {
         assert!(refused.len() == 1 && refused[0].contains("bad.xml"), "{refused:?}");
         let text = fs::read_to_string(place.kept()).expect("it was kept");
         for damaged in ["", "other\n", &text[..text.len() / 2]] {
-            fs::write(place.kept(), damaged).expect("it is ours");
+            fs::write(place.kept(), damaged).expect("it is writable");
             assert_eq!(place.open().files_read(), 2, "{damaged}");
         }
-        fs::remove_dir_all(place.0.join("cache")).expect("it is ours");
-        fs::write(place.0.join("cache"), "a file in the place of the folder").expect("it is ours");
+        fs::remove_dir_all(place.0.join("cache")).expect("it is writable");
+        fs::write(place.0.join("cache"), "a file in the place of the folder").expect("it is writable");
         let folder = place.open();
         assert!(folder.not_kept().is_some() && folder.index().devices().count() == 1);
         assert!(EsiFolder::open(&place.0.join("nowhere"), None).is_err());

@@ -1,4 +1,4 @@
-//! What was heard on the links of a segment before the first frame.
+//! What has arrived on the links of a segment before the first frame.
 
 use std::fmt;
 use std::hash::{BuildHasher, RandomState};
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::{Heard, LISTEN};
 
-/// Two MainDevices that begin at the same time do not listen equally long: the one that has to listen longer hears the
+/// Two MainDevices that begin at the same time do not listen equally long: the one that listens longer receives the
 /// other. Up to this time is added.
 const SPREAD: Duration = Duration::from_millis(250);
 /// Interval of checks of a thread that waits.
@@ -16,7 +16,7 @@ const LOOK: Duration = Duration::from_millis(1);
 /// The sockets with which a segment is listened to.
 pub trait ListeningSockets: fmt::Debug + Send + Sync {
     /// The number of times that they were bound to an interface; `None` while one is not bound to an interface that is
-    /// there, and hears nothing.
+    /// there, and receives nothing.
     fn binding(&self) -> Option<u32>;
 }
 
@@ -24,17 +24,17 @@ pub trait ListeningSockets: fmt::Debug + Send + Sync {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ListenedPhase {
-    /// No link has a carrier: nothing can be heard.
+    /// No link has a carrier: no frame can arrive.
     NoCarrier,
     /// Frames are listened for.
     Listening,
     /// Another MainDevice drives it, whose first frame was this.
     Occupied(Heard),
-    /// Nothing was heard for long enough: it is driven.
+    /// No frame has arrived for long enough: the segment is driven.
     Free,
 }
 
-/// What was heard on the links of a segment; shared with other threads, and kept while the segment passes from one
+/// What has arrived on the links of a segment; shared with other threads, and kept while the segment passes from one
 /// process to another.
 #[derive(Debug)]
 pub struct Listened {
@@ -43,7 +43,7 @@ pub struct Listened {
 }
 
 impl Default for Listened {
-    /// Nothing was heard yet.
+    /// No frame has arrived yet.
     fn default() -> Listened {
         let random = RandomState::new().hash_one(0_u8);
         let spread = SPREAD.as_nanos() as u64;
@@ -52,7 +52,7 @@ impl Default for Listened {
 }
 
 impl Listened {
-    /// Nothing was heard yet; the listening takes this time.
+    /// No frame has arrived yet; the listening takes this time.
     pub fn lasting(lasts: Duration) -> Listened {
         Listened { phase: Mutex::new(ListenedPhase::NoCarrier), lasts }
     }

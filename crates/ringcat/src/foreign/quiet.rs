@@ -14,15 +14,16 @@ use super::{Heard, LAST_FRAMES, Listened, ListenedPhase, ListeningSockets, has_c
 use crate::links::{Links, PerLink};
 use crate::text::address_of_sender;
 
-/// Interval of checks while listening: of two MainDevices that begin at once, one hears the first one that sends.
+/// Interval of checks while listening: of two MainDevices that begin at once, one receives frames of the first one that
+/// sends.
 const LOOK: Duration = Duration::from_millis(1);
-/// The same while there is nothing to hear, or another MainDevice is heard.
+/// The same while no frame can arrive, or frames of another MainDevice arrive.
 const LONG_LOOK: Duration = Duration::from_millis(5);
 /// Frames that a check takes at most from each half.
 const FRAMES: usize = 256;
 
 /// Links of an acyclic half that send nothing, and report no carrier, before they have been listened to with a carrier
-/// and no other MainDevice was heard. While one is heard they stay silent.
+/// and no frame of another MainDevice has arrived. While such frames arrive they stay silent.
 #[derive(Debug)]
 pub struct QuietLinks<L> {
     links: L,
@@ -47,7 +48,7 @@ struct Silence {
     /// The carriers, and since when they are so.
     carriers: [bool; 2],
     carriers_since: [Instant; 2],
-    /// Since when nothing was heard.
+    /// Since when no frame has arrived.
     silent_since: Instant,
 }
 
@@ -119,7 +120,7 @@ impl Silence {
         }
     }
 
-    /// Whether nothing was heard for long enough, with the same sockets all the time.
+    /// Whether no frame has arrived for long enough, with the same sockets all the time.
     fn is_over(&mut self, now: Instant) -> bool {
         if !self.carriers.contains(&true) || now.since(self.silent_since) < self.listened.lasts() {
             return false;
@@ -163,8 +164,8 @@ impl<L: Links> Links for QuietLinks<L> {
         self.links.has_frame()
     }
 
-    fn knows_arrivals(&self) -> bool {
-        self.links.knows_arrivals()
+    fn has_arrival_times(&self) -> bool {
+        self.links.has_arrival_times()
     }
 
     fn received_at(&mut self, sent_at: Instant, now: Instant) -> Option<Instant> {

@@ -41,7 +41,7 @@ pub struct MappedObject {
     pub index: u16,
     /// Subindex.
     pub sub_index: u8,
-    /// Direction, as the MainDevice sees it.
+    /// Direction, from the side of the MainDevice.
     pub direction: Direction,
     /// Its place.
     pub entry: Entry,

@@ -78,7 +78,7 @@ impl Links for PortLinks<'_> {
         false
     }
 
-    fn knows_arrivals(&self) -> bool {
+    fn has_arrival_times(&self) -> bool {
         true
     }
 

@@ -4,8 +4,8 @@
 //! A process that is killed leaves its interfaces on. They forward nothing then, and the ACTIVE MainDevice of the ring
 //! has no bus; with interfaces that are off it has a line.
 //!
-//! [`Guard::start`] starts the process; its program calls [`run`]. The guard sees the end of the process at once, and
-//! that it hangs, or is stopped by a signal, from a heartbeat in shared memory: [`Guard::beat`] in the loop of the
+//! [`Guard::start`] starts the process; its program calls [`run`]. The guard detects the end of the process at once,
+//! and that it hangs, or is stopped by a signal, from a heartbeat in shared memory: [`Guard::beat`] in the loop of the
 //! program. Where the guard has acted, the next beat shows that, and nothing of the process leaves any more.
 
 mod silence;

@@ -1,4 +1,4 @@
-//! From a controller that knows nothing of its ring to a running application in the role that is free: listening,
+//! From a controller without information about its ring to a running application in the role that is free: listening,
 //! following, becoming ACTIVE (protocol 9.10).
 
 use std::sync::Arc;
@@ -22,7 +22,7 @@ use crate::window::Window;
 /// Longest time of listening before it is decided again whether there is an ACTIVE.
 const SLICE: Duration = Duration::from_millis(10);
 
-/// What a MainDevice of two does next, before it has an application.
+/// The next step of one of two MainDevices, before it has an application.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Next {
@@ -83,7 +83,7 @@ impl<L: Links> MainDevice<L> {
         self.engine.role_control()
     }
 
-    /// What was heard of the ACTIVE so far.
+    /// What has arrived from the ACTIVE so far.
     pub fn heard(&self) -> Heard {
         self.engine.heard()
     }
@@ -143,9 +143,9 @@ impl<L: Links> MainDevice<L> {
         }
     }
 
-    /// Takes the role that is free: follows an ACTIVE as soon as all is known of it, or becomes ACTIVE if none is heard
-    /// for [`Policy::listen`] and a random pause. Forwards meanwhile. With [`Policy::permanent_standby`] it waits for
-    /// an ACTIVE without a limit; [`Joining`] has the same in steps.
+    /// Takes the role that is free: follows an ACTIVE as soon as all is known of it, or becomes ACTIVE if no frame of
+    /// one arrives for [`Policy::listen`] and a random pause. Forwards meanwhile. With [`Policy::permanent_standby`] it
+    /// waits for an ACTIVE without a limit; [`Joining`] has the same in steps.
     ///
     /// ```no_run
     /// use std::time::Duration;

@@ -1,8 +1,8 @@
-//! When a MainDevice of two takes the role of the ACTIVE, and when it gives it up: a ready-made policy (protocol 9.6,
-//! 9.9).
+//! When one of two MainDevices takes the role of the ACTIVE, and when it gives it up: a ready-made policy (protocol
+//! 9.6, 9.9).
 //!
-//! In: the role, when the other MainDevice was heard last, whether two are ACTIVE, and the time. Out: a request. An
-//! application that decides itself has no policy, and uses [`RoleControl`](super::RoleControl).
+//! In: the role, when a frame of the other MainDevice arrived last, whether two are ACTIVE, and the time. Out: a
+//! request. An application that decides itself has no policy, and uses [`RoleControl`](super::RoleControl).
 
 use std::time::Duration;
 
@@ -31,7 +31,7 @@ pub enum OnCollision {
     Stay,
 }
 
-/// When a MainDevice of two takes over, and when it yields.
+/// When one of two MainDevices takes over, and when it yields.
 ///
 /// ```
 /// use std::time::Duration;
@@ -179,7 +179,7 @@ impl Watch {
         }
     }
 
-    /// The random pause of a MainDevice that has heard nothing since it became INACTIVE.
+    /// The random pause of a MainDevice that has received nothing since it became INACTIVE.
     fn pause_of(&mut self, inactive_since: Instant) -> Duration {
         if self.pause.0 != inactive_since {
             self.pause = (inactive_since, self.dice.up_to(self.time_out));
@@ -281,7 +281,7 @@ mod tests {
 
     // covers: standby, MR-10
     #[test]
-    fn of_two_active_the_one_with_the_higher_address_yields_unless_told_otherwise() {
+    fn of_two_active_the_one_with_the_higher_address_yields_unless_set_otherwise() {
         let decide = |policy: Policy, last| watch(policy).decide(&collided(last), Instant(MS));
         let policy = Policy::default();
         assert_eq!(decide(policy, 0x10), Some(RoleRequest::Inactive));

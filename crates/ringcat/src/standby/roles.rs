@@ -1,4 +1,4 @@
-//! Roles of an application that is one of two MainDevices, and what it knows of the other one.
+//! Roles of an application that is one of two MainDevices, and the state of the other one.
 
 use ringcat_engine::main_device::MainDeviceRole;
 use ringcat_engine::role::{Partner, RoleControl};
@@ -23,7 +23,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.cyclic.exchange.role_control()
     }
 
-    /// The other MainDevice, as this one knows it as ACTIVE.
+    /// State of the other MainDevice, as determined while this one is ACTIVE.
     pub fn partner(&self) -> Partner {
         self.cyclic.exchange.partner()
     }
@@ -53,7 +53,7 @@ impl ProcessData<'_> {
         self.exchange.role()
     }
 
-    /// The other MainDevice, as this one knows it as ACTIVE.
+    /// State of the other MainDevice, as determined while this one is ACTIVE.
     pub fn partner(&self) -> Partner {
         self.exchange.partner()
     }

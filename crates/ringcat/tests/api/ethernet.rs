@@ -32,7 +32,7 @@ const PERIOD: Duration = Duration::from_millis(2);
 const LIMIT: Duration = Duration::from_secs(30);
 const OPTIONS: EthernetOptions = EthernetOptions::new(3, [0, 0, 0, 7, 8, 9]);
 
-/// One interface, as the host sees it.
+/// One interface of the host.
 #[derive(Default)]
 struct Cable {
     name: String,

@@ -27,7 +27,7 @@ const TRANSFER: TransferLimits = TransferLimits::new(Duration::from_secs(5), Dur
 const TYPE: RegisterAddress = RegisterAddress(0x0000);
 /// An object that takes many segments.
 const LARGE: u16 = 0x2002;
-const SPEAKER: SubDeviceId = SubDeviceId(1);
+const MAILBOX_DEVICE: SubDeviceId = SubDeviceId(1);
 
 fn supervisor() -> Result<(SupervisorThread, SharedSegment), Error> {
     let segment = Segment::from_toml(SEGMENT, Path::new("."))?;
@@ -65,7 +65,7 @@ fn one_service_works_before_activation_beside_cycles_and_from_any_thread() -> Re
     assert!(main_device.subdevice(Position(99)).register_read_bytes(TYPE, 3).is_err(), "there is no such SubDevice");
 
     let mut application = main_device.activate(automatic(&found.subdevices, PERIOD))?;
-    let mut read = application.subdevice(SPEAKER).register_read_bytes(TYPE, 3);
+    let mut read = application.subdevice(MAILBOX_DEVICE).register_read_bytes(TYPE, 3);
     let mut cycles = 0;
     let polled = loop {
         if let Some(result) = read.take() {
@@ -130,11 +130,11 @@ fn a_stop_ends_jobs_and_an_abort_leaves_the_mailbox_free() -> Result<(), Error> 
         std::thread::sleep(Duration::from_millis(1));
     }
     let supervisor = cycles.supervisor().clone();
-    let mailbox_device = supervisor.background().subdevice(SPEAKER).limits(TRANSFER.with_bytes(200_000));
+    let mailbox_device = supervisor.background().subdevice(MAILBOX_DEVICE).limits(TRANSFER.with_bytes(200_000));
     let start = || mailbox_device.sdo_read::<Vec<u8>>(LARGE, 0);
     start().abort()?;
     drop(start());
-    assert_eq!(supervisor.subdevice(SPEAKER).sdo_read::<Vec<u8>>(0x2001, 7)?.len(), 2);
+    assert_eq!(supervisor.subdevice(MAILBOX_DEVICE).sdo_read::<Vec<u8>>(0x2001, 7)?.len(), 2);
 
     // Never ready: only the stop ends it.
     let endless = supervisor.start_job(|_| std::future::pending::<()>());

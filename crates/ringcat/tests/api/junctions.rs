@@ -132,7 +132,7 @@ fn breaks_of_rings_behind_junctions_are_described_in_words() {
     assert_eq!(words(changed(false, 0)), format!("Line is fixed {place}"));
     assert!(words(changed(true, 2)).contains("2 cables"));
     let learned = Event::JunctionLearned { closing: Closing { head: port(1, 1), tail: port(3, 1) } };
-    // A scan knows no declaration.
+    // A scan has no declaration.
     assert!(words(learned).contains("from SubDevice 3 port 1 back to SubDevice 1 port 1"));
     let blocked = |breaks| words(Event::JunctionsBlocked { blocked: true, breaks });
     assert!(blocked(1).contains("no frame comes back while a ring behind a junction is open"));

@@ -21,7 +21,7 @@ use ringcat::{
 
 const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"all-protocols\"\n\
                        [[device]]\ntype = \"servo\"\n[[device]]\ntype = \"ethernet-terminal\"\n";
-const SPEAKER: Position = Position(1);
+const MAILBOX_DEVICE: Position = Position(1);
 const DRIVE: Position = Position(2);
 const TERMINAL: Position = Position(3);
 const LIMIT: Duration = Duration::from_secs(30);
@@ -35,7 +35,7 @@ fn scanned() -> Result<Bus, Error> {
 }
 
 fn mailbox_device(bus: &mut Bus) -> SubDevice<&mut Bus> {
-    bus.subdevice(SPEAKER)
+    bus.subdevice(MAILBOX_DEVICE)
 }
 
 fn failure<T: std::fmt::Debug>(result: Result<T, Error>) -> SubDeviceFailure {
@@ -230,7 +230,7 @@ fn rare_services_have_every_form() -> Result<(), Box<dyn StdError>> {
     let (_cyclic, acyclic) = SharedSegment::halves(network);
     let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
     supervisor.scan()?;
-    let lengths = supervisor.background().subdevice(SPEAKER).sdo_list_lengths();
+    let lengths = supervisor.background().subdevice(MAILBOX_DEVICE).sdo_list_lengths();
     let assigned = supervisor.subdevice(DRIVE).pdo_assignment(3)?;
     assert_eq!(assigned.len(), 1);
     assert!(lengths.finish()?.of(ListType::All).is_some_and(|count| count > 10));

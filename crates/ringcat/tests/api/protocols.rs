@@ -14,7 +14,7 @@ use ringcat::{
 
 const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"all-protocols\"\n";
 const COUPLER: Position = Position(0);
-const SPEAKER: Position = Position(1);
+const MAILBOX_DEVICE: Position = Position(1);
 /// Memory that nothing uses.
 const USER_RAM: RegisterAddress = RegisterAddress(0x0F80);
 
@@ -27,7 +27,7 @@ fn scanned() -> Result<Bus, Error> {
 }
 
 fn mailbox_device(bus: &mut Bus) -> SubDevice<&mut Bus> {
-    bus.subdevice(SPEAKER)
+    bus.subdevice(MAILBOX_DEVICE)
 }
 
 // covers: api

@@ -26,7 +26,7 @@ use ringcat_wire::register::{LoopControl, map};
 const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"all-protocols\"\n";
 const PERIOD: Duration = Duration::from_millis(2);
 const LIMIT: Duration = Duration::from_secs(30);
-const SPEAKER: SubDeviceId = SubDeviceId(1);
+const MAILBOX_DEVICE: SubDeviceId = SubDeviceId(1);
 /// Memory that nothing uses.
 const USER_RAM: RegisterAddress = RegisterAddress(0x0F80);
 const LIMITS: Limits = Limits::new(Duration::from_secs(5), Duration::from_secs(10));
@@ -42,7 +42,7 @@ fn objects_and_files_are_moved_from_any_thread_and_requests_from_the_cyclic_one(
     // Before activation, in PREOP.
     let mailbox_device = supervisor.subdevice(Position(1)).limits(TRANSFER.with_bytes(200_000));
     assert_eq!(mailbox_device.sdo_read::<Vec<u8>>(0x2002, 0)?.len(), 100_000);
-    let mut request = supervisor.create_sdo_request(SPEAKER, 4)?;
+    let mut request = supervisor.create_sdo_request(MAILBOX_DEVICE, 4)?;
     let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
     let read = Arc::new(AtomicU32::new(0));
     let seen = read.clone();
@@ -68,7 +68,7 @@ fn objects_and_files_are_moved_from_any_thread_and_requests_from_the_cyclic_one(
     cycles.supervisor().wait_until_op(LIMIT)?;
     // During process data, by a handle of its own.
     let handle = cycles.supervisor().clone();
-    let mailbox_device = handle.subdevice(SPEAKER).limits(TRANSFER);
+    let mailbox_device = handle.subdevice(MAILBOX_DEVICE).limits(TRANSFER);
     mailbox_device.sdo_write(0x2001, 7, 0x1234u16)?;
     let end = Instant::now() + LIMIT;
     while read.load(Ordering::Relaxed) != 0x1234 {
@@ -79,7 +79,7 @@ fn objects_and_files_are_moved_from_any_thread_and_requests_from_the_cyclic_one(
     assert!(error.to_string().contains("0x06020000"), "{error}");
     assert_eq!(file_there_and_back(&handle)?, vec![7; 3000]);
     let supervisor = cycles.end()?.stop(LastOutputs::Zero, AlState::Init, LIMIT)?.supervisor;
-    let gone = supervisor.subdevice(SPEAKER).sdo_read::<u16>(0x2001, 7).expect_err("nothing is active");
+    let gone = supervisor.subdevice(MAILBOX_DEVICE).sdo_read::<u16>(0x2001, 7).expect_err("nothing is active");
     assert!(gone.to_string().contains("no declaration is active"), "{gone}");
     Ok(())
 }
@@ -87,7 +87,7 @@ fn objects_and_files_are_moved_from_any_thread_and_requests_from_the_cyclic_one(
 /// A file written and read by functions of the engine that run in its thread.
 fn file_there_and_back(handle: &SupervisorThread) -> Result<Vec<u8>, Error> {
     let file = handle.run(|engine| {
-        let mailbox = engine.mailbox(SPEAKER);
+        let mailbox = engine.mailbox(MAILBOX_DEVICE);
         async move {
             let mailbox = mailbox.expect("it is declared");
             let options = FoeOptions::default().with_limits(LIMITS);
@@ -114,16 +114,16 @@ fn services_on_single_subdevices_and_jobs_work_from_any_thread() -> Result<(), E
     let image = mailbox_device.sii_read()?;
     assert!(mailbox_device.sii_write(image[..64].to_vec(), false).is_err(), "no image");
     assert_eq!(mailbox_device.sii_write(image, false)?.written, 0);
-    assert_eq!(supervisor.statistics(SPEAKER)?, None);
+    assert_eq!(supervisor.statistics(MAILBOX_DEVICE)?, None);
     assert!(!supervisor.force_topology_change()?);
     assert!(supervisor.rescan(LIMIT).is_err(), "nothing is declared");
     let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
     let cycles = application.start_cycles(|| (), |_| ControlFlow::Continue(()))?;
     cycles.supervisor().wait_until_op(LIMIT)?;
     let handle = cycles.supervisor().clone();
-    assert_eq!(handle.subdevice(SPEAKER).read_statistics()?.readings, 1);
-    handle.subdevice(SPEAKER).clear_statistics()?;
-    assert_eq!(handle.subdevice(SPEAKER).port(0)?, LoopControl::Auto);
+    assert_eq!(handle.subdevice(MAILBOX_DEVICE).read_statistics()?.readings, 1);
+    handle.subdevice(MAILBOX_DEVICE).clear_statistics()?;
+    assert_eq!(handle.subdevice(MAILBOX_DEVICE).port(0)?, LoopControl::Auto);
     let rescan = handle.rescan(LIMIT)?;
     assert!(rescan.is_complete() && rescan.subdevices.len() == 2 && rescan.missing.is_empty(), "{rescan:?}");
     let read = RawDatagram::new(Command::Brd, Target::Broadcast(map::TYPE), vec![0]).with_resend(true);

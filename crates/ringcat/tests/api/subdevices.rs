@@ -21,7 +21,7 @@ const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[
                        [[device]]\ntype = \"servo\"\n";
 const PERIOD: Duration = Duration::from_millis(2);
 const LIMIT: Duration = Duration::from_secs(30);
-const SPEAKER: Position = Position(1);
+const MAILBOX_DEVICE: Position = Position(1);
 /// Memory that nothing uses.
 const USER_RAM: RegisterAddress = RegisterAddress(0x0F80);
 
@@ -46,7 +46,7 @@ fn failure<T: std::fmt::Debug>(result: Result<T, Error>) -> SubDeviceFailure {
 #[test]
 fn before_a_scan_without_a_mailbox_and_not_declared_are_different_errors() -> Result<(), Box<dyn StdError>> {
     let mut main_device = main_device()?;
-    let early = main_device.subdevice(SPEAKER).sdo_read::<u16>(0x2001, 7);
+    let early = main_device.subdevice(MAILBOX_DEVICE).sdo_read::<u16>(0x2001, 7);
     assert_eq!(failure(early), SubDeviceFailure::NotScanned);
     main_device.scan()?;
     let nowhere = main_device.subdevice(Position(99)).sdo_read::<u16>(0x2001, 7);
@@ -72,34 +72,34 @@ fn before_a_scan_without_a_mailbox_and_not_declared_are_different_errors() -> Re
 fn objects_files_idns_and_registers_before_activation_by_position() -> Result<(), Box<dyn StdError>> {
     let mut main_device = main_device()?;
     main_device.scan()?;
-    main_device.subdevice(SPEAKER).sdo_write(0x2001, 7, 0x1234u16)?;
-    assert_eq!(main_device.subdevice(SPEAKER).sdo_read::<u16>(0x2001, 7)?, 0x1234);
-    let wrong = main_device.subdevice(SPEAKER).sdo_read::<u32>(0x2001, 7).expect_err("it has two bytes");
+    main_device.subdevice(MAILBOX_DEVICE).sdo_write(0x2001, 7, 0x1234u16)?;
+    assert_eq!(main_device.subdevice(MAILBOX_DEVICE).sdo_read::<u16>(0x2001, 7)?, 0x1234);
+    let wrong = main_device.subdevice(MAILBOX_DEVICE).sdo_read::<u32>(0x2001, 7).expect_err("it has two bytes");
     assert!(wrong.to_string().ends_with("SDO 0x2001:07: expected 4 bytes, got 2"), "{wrong}");
-    let objects = main_device.subdevice(SPEAKER).sdo_info()?;
+    let objects = main_device.subdevice(MAILBOX_DEVICE).sdo_info()?;
     assert!(objects.contains(&0x2001) && objects.contains(&0x1018), "{objects:?}");
-    assert!(!main_device.subdevice(SPEAKER).sdo_object(0x1018)?.name.is_empty());
-    assert_eq!(main_device.subdevice(SPEAKER).sdo_entry(0x2001, 7)?.bit_length, 16);
-    let refused = main_device.subdevice(SPEAKER).sdo_read::<u8>(0x7777, 0).expect_err("there is none");
+    assert!(!main_device.subdevice(MAILBOX_DEVICE).sdo_object(0x1018)?.name.is_empty());
+    assert_eq!(main_device.subdevice(MAILBOX_DEVICE).sdo_entry(0x2001, 7)?.bit_length, 16);
+    let refused = main_device.subdevice(MAILBOX_DEVICE).sdo_read::<u8>(0x7777, 0).expect_err("there is none");
     assert!(refused.to_string().contains("0x06020000"), "{refused}");
     let Error::SubDevice(refused) = refused else { panic!("{refused:?}") };
     assert!(matches!(refused.failure, SubDeviceFailure::Sdo(_)), "{refused:?}");
     let short = TransferLimits::default().with_bytes(10);
-    let long = main_device.subdevice(SPEAKER).limits(short).sdo_read::<Vec<u8>>(0x2002, 0);
+    let long = main_device.subdevice(MAILBOX_DEVICE).limits(short).sdo_read::<Vec<u8>>(0x2002, 0);
     assert!(matches!(failure(long), SubDeviceFailure::Sdo(_)));
 
     let drive = Idn::standard(0, 47);
-    main_device.subdevice(SPEAKER).soe_write(0, drive, -5i32)?;
-    assert_eq!(main_device.subdevice(SPEAKER).soe_read::<i32>(0, drive)?, -5);
-    assert_eq!(main_device.subdevice(SPEAKER).foe_write("recipe", vec![7; 3000])?, 3000);
-    assert_eq!(main_device.subdevice(SPEAKER).foe_read("recipe")?, [7; 3000]);
-    let unknown = main_device.subdevice(SPEAKER).foe_read("nothing").expect_err("no such file");
+    main_device.subdevice(MAILBOX_DEVICE).soe_write(0, drive, -5i32)?;
+    assert_eq!(main_device.subdevice(MAILBOX_DEVICE).soe_read::<i32>(0, drive)?, -5);
+    assert_eq!(main_device.subdevice(MAILBOX_DEVICE).foe_write("recipe", vec![7; 3000])?, 3000);
+    assert_eq!(main_device.subdevice(MAILBOX_DEVICE).foe_read("recipe")?, [7; 3000]);
+    let unknown = main_device.subdevice(MAILBOX_DEVICE).foe_read("nothing").expect_err("no such file");
     assert!(unknown.to_string().contains("FoE \"nothing\": refused"), "{unknown}");
 
     main_device.subdevice(Position(0)).register_write(USER_RAM, 0xBEEFu16)?;
     assert_eq!(main_device.subdevice(Position(0)).register_read::<u16>(USER_RAM)?, 0xBEEF);
     assert_eq!(main_device.subdevice(Position(0)).port(0)?, LoopControl::Auto);
-    let registers = main_device.subdevice(SPEAKER).state()?;
+    let registers = main_device.subdevice(MAILBOX_DEVICE).state()?;
     assert_eq!(registers.status.al_state(), Some(AlState::PreOp), "its mailbox was used");
     Ok(())
 }
@@ -109,11 +109,11 @@ fn objects_files_idns_and_registers_before_activation_by_position() -> Result<()
 fn firmware_is_written_through_boot_and_the_new_version_is_reported() -> Result<(), Box<dyn StdError>> {
     let mut main_device = main_device()?;
     main_device.scan()?;
-    assert_eq!(main_device.subdevice(SPEAKER).sdo_read::<String>(0x100A, 0)?, "1.0");
-    main_device.subdevice(SPEAKER).request_state(AlState::Boot)?;
-    main_device.subdevice(SPEAKER).foe_write("firmware.bin", firmware::image("2.7", &[0x5A; 20_000]))?;
-    main_device.subdevice(SPEAKER).request_state(AlState::Init)?;
-    assert_eq!(main_device.subdevice(SPEAKER).sdo_read::<String>(0x100A, 0)?, "2.7");
+    assert_eq!(main_device.subdevice(MAILBOX_DEVICE).sdo_read::<String>(0x100A, 0)?, "1.0");
+    main_device.subdevice(MAILBOX_DEVICE).request_state(AlState::Boot)?;
+    main_device.subdevice(MAILBOX_DEVICE).foe_write("firmware.bin", firmware::image("2.7", &[0x5A; 20_000]))?;
+    main_device.subdevice(MAILBOX_DEVICE).request_state(AlState::Init)?;
+    assert_eq!(main_device.subdevice(MAILBOX_DEVICE).sdo_read::<String>(0x100A, 0)?, "2.7");
     Ok(())
 }
 
@@ -123,9 +123,9 @@ fn an_overall_limit_ends_what_takes_too_long() -> Result<(), Box<dyn StdError>> 
     let mut main_device = main_device()?;
     main_device.scan()?;
     let limit = Duration::from_millis(3);
-    let late = main_device.subdevice(SPEAKER).within(limit).sdo_read::<Vec<u8>>(0x2002, 0);
+    let late = main_device.subdevice(MAILBOX_DEVICE).within(limit).sdo_read::<Vec<u8>>(0x2002, 0);
     assert_eq!(failure(late), SubDeviceFailure::TimedOut { limit });
-    assert_eq!(main_device.subdevice(SPEAKER).sdo_read::<Vec<u8>>(0x2002, 0)?.len(), 100_000);
+    assert_eq!(main_device.subdevice(MAILBOX_DEVICE).sdo_read::<Vec<u8>>(0x2002, 0)?.len(), 100_000);
     Ok(())
 }
 
@@ -157,13 +157,13 @@ fn any_thread_uses_a_subdevice_while_cycles_run() -> Result<(), Box<dyn StdError
     let segment = Segment::from_toml(SEGMENT, Path::new("."))?;
     let (cyclic, acyclic) = SharedSegment::halves(Network::from_description(segment)?);
     let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
-    assert_eq!(failure(supervisor.subdevice(SPEAKER).sdo_read::<u16>(0x2001, 7)), SubDeviceFailure::NotScanned);
+    assert_eq!(failure(supervisor.subdevice(MAILBOX_DEVICE).sdo_read::<u16>(0x2001, 7)), SubDeviceFailure::NotScanned);
     supervisor.scan()?;
     assert_eq!(failure(supervisor.subdevice(SubDeviceId(1)).sdo_info()), SubDeviceFailure::NotActive);
     let (declaration, [_, mailbox_device, drive]) = declaration();
     let cycles = supervisor.activate(declaration, cyclic)?.start_cycles(|| (), |_| ControlFlow::Continue(()))?;
     cycles.supervisor().wait_until_op(LIMIT)?;
-    assert_eq!(failure(cycles.supervisor().subdevice(SPEAKER).sdo_info()), SubDeviceFailure::Active);
+    assert_eq!(failure(cycles.supervisor().subdevice(MAILBOX_DEVICE).sdo_info()), SubDeviceFailure::Active);
     let patient = TransferLimits::default().with_request(LIMIT).with_answer(LIMIT);
     thread::scope(|scope| {
         let threads = [mailbox_device, drive].map(|subdevice| {

@@ -1,4 +1,4 @@
-//! A daemon on a simulated segment whose SubDevices the test sees.
+//! A daemon on a simulated segment whose SubDevices the test can inspect.
 
 use std::fmt::Write;
 use std::os::unix::net::UnixStream;
@@ -110,7 +110,7 @@ impl Bench {
         bench
     }
 
-    /// Waits until the daemon has the bus and knows so many SubDevices.
+    /// Waits until the daemon has the bus and so many SubDevices.
     pub fn wait_until_scanned(&self, count: usize) {
         self.wait_until("scanned", |bench| {
             let Answer::State(state) = ask(&mut bench.client(), Query::State) else { return false };

@@ -34,7 +34,7 @@ fn wait_for_first_frame(bench: &Bench, after_ns: u64) -> Duration {
     }
 }
 
-/// Rounds and seed of tests that kill applications at random moments; `RINGCAT_KILLS=500:7` asks for others.
+/// Rounds and seed of tests that kill applications at random moments; `RINGCAT_KILLS=500:7` sets others.
 fn rounds() -> (usize, Random) {
     let asked = std::env::var("RINGCAT_KILLS").unwrap_or_else(|_| "50:1".to_owned());
     let (count, seed) = asked.split_once(':').unwrap_or((&asked, "1"));

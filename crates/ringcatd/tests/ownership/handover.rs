@@ -89,7 +89,7 @@ fn nothing_is_left_of_a_thousand_hand_overs() {
 
 // covers: daemon
 #[test]
-fn a_second_application_is_told_the_process_that_drives_the_bus() {
+fn a_second_application_gets_the_process_that_drives_the_bus() {
     let bench = Bench::start(2);
     let bus = bench.take();
     let options = ringcat::Options::default();

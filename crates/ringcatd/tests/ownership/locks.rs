@@ -19,7 +19,7 @@ fn another_user_can_lock_none_of_the_files_that_a_daemon_waits_for() {
         return;
     }
     let (directory, turn) = (directory(), turn());
-    std::fs::set_permissions(&directory, std::fs::Permissions::from_mode(0o755)).expect("it is ours");
+    std::fs::set_permissions(&directory, std::fs::Permissions::from_mode(0o755)).expect("it is writable");
     let mut running = Running::at(&Start { counts: &[2], ..Start::default() }, directory, turn);
     wait_for(&mut running.client(), 0, 2);
     running.kill();

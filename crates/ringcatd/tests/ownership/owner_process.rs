@@ -1,4 +1,4 @@
-//! An application in a process of its own: the test program again, as the variable tells.
+//! An application in a process of its own: the test program again, as the variable states.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -67,7 +67,7 @@ impl OwnerProcess {
         self
     }
 
-    /// Starts one that writes its core where a signal asks for that, into this directory.
+    /// Starts one that writes its core if a signal requires it, into this directory.
     pub fn start_with_core(socket: &Path, directory: &Path) -> OwnerProcess {
         let mut shell = Command::new("sh");
         shell.args(["-c", "ulimit -c unlimited; exec \"$0\" \"$@\""]).current_dir(directory);
@@ -122,12 +122,12 @@ impl OwnerProcess {
         })
     }
 
-    /// Tells it to end in order.
+    /// Orders it to end.
     pub fn input_ends(&mut self) {
         self.input = None;
     }
 
-    /// Tells it to end in order. The debug level that it had.
+    /// Orders it to end. The debug level that it had.
     pub fn end_with_level(mut self) -> String {
         self.input_ends();
         let said = self.wait_for("debug level");
@@ -136,7 +136,7 @@ impl OwnerProcess {
         said
     }
 
-    /// Tells it to end in order, and waits.
+    /// Orders it to end, and waits.
     pub fn end(mut self) -> String {
         self.input_ends();
         let said = self.wait_for("ended");

@@ -135,7 +135,7 @@ fn the_init_script_has_the_verbs_of_the_manual_and_its_header() {
     std::fs::write(&written, "#!/bin/sh\necho \"called: $*\"\n").expect("it can be written");
     copy_program(&written, &program);
     let mode = std::os::unix::fs::PermissionsExt::from_mode(0o755);
-    std::fs::set_permissions(&program, mode).expect("it is ours");
+    std::fs::set_permissions(&program, mode).expect("it is writable");
     let called = |verb: &str| said(&run("sh", &[ours.to_str().expect("text"), verb]).expect("sh is there"));
     assert_eq!(called("start"), "Starting EtherCAT master\ncalled: start\n");
     assert_eq!(called("stop"), "Shutting down EtherCAT master\ncalled: stop\n");

@@ -116,7 +116,7 @@ fn a_check_says_what_was_understood_and_its_exit_code_whether_it_is_right() {
 
 // covers: daemon
 #[test]
-fn the_service_manager_is_told_ready_state_life_and_end() {
+fn the_service_manager_gets_ready_state_life_and_end() {
     let (turn, directory) = (turn(), directory());
     let conf = file(&directory, &[3], "MASTER1_DEVICE=no-such\n");
     let path = directory.join("notify");
@@ -151,7 +151,7 @@ fn control(conf: &str, verb: &str) -> (Option<i32>, String) {
 
 // covers: daemon
 #[test]
-fn ethercatctl_starts_asks_restarts_and_stops_the_daemon() {
+fn ethercatctl_starts_queries_restarts_and_stops_the_daemon() {
     let (_turn, directory) = (turn(), directory());
     let further = format!("RINGCAT_SOCKET=\"{}\"\n", directory.join("socket").display());
     let conf = file(&directory, &[3], &further);

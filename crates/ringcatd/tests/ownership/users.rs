@@ -19,7 +19,7 @@ const TEST: &str = "users::each_mode_lets_root_members_and_strangers_do_what_its
 /// The group of the socket, a user in it and one that is not.
 const GROUP: u32 = 65_432;
 const MEMBER: u32 = 65_433;
-const STRANGER: u32 = 65_434;
+const OTHER_USER: u32 = 65_434;
 
 /// What this user can do at a socket, in one word.
 fn tried(socket: &Path) -> &'static str {
@@ -76,10 +76,10 @@ fn each_mode_lets_root_members_and_strangers_do_what_its_bits_say() {
     ];
     for (mode, expected) in cases {
         let bench = Bench::with_rights(2, Rights { group: Some(GROUP), mode });
-        let found = [(0, 0), (MEMBER, GROUP), (STRANGER, STRANGER)].map(|(user, group)| tries(&bench, user, group));
+        let found = [(0, 0), (MEMBER, GROUP), (OTHER_USER, OTHER_USER)].map(|(user, group)| tries(&bench, user, group));
         assert_eq!(found, expected, "{mode:04o}");
     }
     // Without a group the bits of others count for members of the daemon's own group, too.
     let bench = Bench::with_rights(2, Rights { group: None, mode: 0o664 });
-    assert_eq!(tries(&bench, STRANGER, 0), "read");
+    assert_eq!(tries(&bench, OTHER_USER, 0), "read");
 }

@@ -1,4 +1,4 @@
-//! A daemon and a library of different releases: each tells the other in one sentence, and nothing is driven.
+//! A daemon and a library of different releases: each reports it to the other in one sentence, and nothing is driven.
 
 use std::io::Write;
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -11,7 +11,7 @@ use ringcat_control::{Connection, Content, Limits, Refusal};
 
 use crate::bench::{Bench, directory, turn};
 
-/// A greeting of another version, with a content that this one does not know.
+/// A greeting of another version, with a content unknown to this one.
 fn greeting(version: u16) -> Vec<u8> {
     let mut bytes = encode(&Content::Hello { program: "another".to_owned() }.into()).expect("it is short");
     bytes[4..6].copy_from_slice(&version.to_le_bytes());
@@ -21,7 +21,7 @@ fn greeting(version: u16) -> Vec<u8> {
 
 // covers: daemon
 #[test]
-fn a_daemon_tells_libraries_of_other_versions_which_one_it_has() {
+fn a_daemon_reports_its_version_to_libraries_of_other_versions() {
     let bench = Bench::start(2);
     for there in [VERSION - 1, VERSION + 1, u16::MAX] {
         let mut stream = UnixStream::connect(&bench.socket).expect("the daemon listens");
@@ -37,7 +37,7 @@ fn a_daemon_tells_libraries_of_other_versions_which_one_it_has() {
 
 // covers: daemon
 #[test]
-fn a_library_tells_that_the_daemon_has_another_version_and_opens_nothing_itself() {
+fn a_library_reports_another_version_of_the_daemon_and_opens_nothing_itself() {
     let _turn = turn();
     let directory = directory();
     let socket = directory.join("socket");

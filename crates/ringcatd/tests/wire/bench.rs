@@ -93,7 +93,7 @@ impl Bench {
         let (near, far) = (format!("ringcatd{id}near"), format!("ringcatd{id}far"));
         let place = std::env::temp_dir().join(&near);
         fs::create_dir_all(&place).expect("it can be made");
-        fs::set_permissions(&place, fs::Permissions::from_mode(0o777)).expect("it is ours");
+        fs::set_permissions(&place, fs::Permissions::from_mode(0o777)).expect("it is writable");
         fs::write(place.join("segment.toml"), segment).expect("it can be written");
         copy_program(&std::env::current_exe().expect("it is known"), &place.join("test"));
         for namespace in [&near, &far] {
@@ -146,7 +146,7 @@ impl Bench {
         // Files of root beside the socket stay.
         for entry in fs::read_dir(&self.place).expect("it is there").flatten() {
             if entry.file_name().to_string_lossy().ends_with(".lock") {
-                fs::remove_file(entry.path()).expect("it is ours");
+                fs::remove_file(entry.path()).expect("it is writable");
             }
         }
         self.start_program(
@@ -260,15 +260,15 @@ impl Bench {
 
     /// When the daemon's first frame arrived after this time: the first acyclic one that no cyclic frame follows.
     pub fn first_frame(&self, after_ns: u64) -> Duration {
-        let own = self.place.join("asks");
+        let own = self.place.join("answers");
         let _ = fs::remove_file(&own);
-        let asks = UnixDatagram::bind(&own).expect("it can be made");
-        asks.set_read_timeout(Some(Duration::from_secs(5))).expect("a socket");
+        let socket = UnixDatagram::bind(&own).expect("it can be made");
+        socket.set_read_timeout(Some(Duration::from_secs(5))).expect("a socket");
         let begin = Instant::now();
         loop {
-            asks.send_to(&after_ns.to_ne_bytes(), self.place.join("times")).expect("the segment runs");
+            socket.send_to(&after_ns.to_ne_bytes(), self.place.join("times")).expect("the segment runs");
             let mut answer = [0; 8];
-            asks.recv(&mut answer).expect("the segment answers");
+            socket.recv(&mut answer).expect("the segment answers");
             match u64::from_ne_bytes(answer) {
                 0 => assert!(begin.elapsed() < LONG, "no frame of the daemon"),
                 at => return Duration::from_nanos(at - after_ns),

@@ -122,7 +122,7 @@ fn an_interface_that_was_chosen_is_left_when_the_host_begins_to_use_it() {
     bench.wait_until("it is left", || used(&bench).is_empty());
 }
 
-/// Carriers of the links as what drives the master sees them.
+/// Carriers of the links in the process that drives the master.
 fn carriers(bench: &Bench) -> Vec<Option<bool>> {
     match bench.client().ask(0, Query::Tool(ToolQuery::Master), Vec::new()) {
         Ok((Answer::Tool(ToolAnswer::Master(report)), _)) => report.links.iter().map(|it| it.carrier).collect(),
@@ -142,7 +142,7 @@ fn links_are_found_by_their_address_whatever_their_name_is() {
     bench.wait_for_line("master 0: interface 02:00:00:00:00:71 is not there; the ring goes on without it");
     let mut child = bench.application("killed");
     bench.wait_for(AlState::Op);
-    // It comes with a name that the application does not know.
+    // It comes with a name unknown to the application.
     bench.plug_in(1);
     ip(&format!("-n {near} link set near1 address 02:00:00:00:00:71"));
     bench.wait_for_line("master 0: interface near1 is there");
@@ -193,7 +193,7 @@ fn interfaces_are_switched_with_the_daemon_but_not_under_an_application() {
 
 // covers: daemon, other-main-device
 #[test]
-fn other_users_of_an_interface_that_is_named_are_told_at_the_start() {
+fn other_users_of_an_interface_that_is_named_are_reported_at_the_start() {
     let Some(mut bench) = Bench::make(LINE, &[0]) else { return };
     ip(&format!("-n {} address add 192.0.2.1/24 dev near0", bench.near));
     bench.start_segment("0");

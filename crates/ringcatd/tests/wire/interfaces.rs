@@ -177,7 +177,7 @@ fn a_segment_that_another_main_device_controls_is_left_alone_until_that_ends() {
         assert_eq!(bench.states(), "8 8 8 ");
         std::thread::sleep(Duration::from_millis(5));
     }
-    // The first daemon drives it without an application, and is heard as well.
+    // The first daemon drives it without an application, and its frames arrive as well.
     owner.kill().expect("it runs");
     owner.wait().expect("it has ended");
     bench.wait_for(AlState::PreOp);

@@ -26,7 +26,7 @@ pub const ROLE: &str = "RINGCAT_TEST_ROLE";
 pub const PLACE: &str = "RINGCAT_TEST_PLACE";
 /// Links of the segment: `0`, or `0,1`.
 pub const LINKS: &str = "RINGCAT_TEST_LINKS";
-/// Address of a web server, for the process that asks it.
+/// Address of a web server, for the process that connects to it.
 pub const ADDRESS: &str = "RINGCAT_TEST_ADDRESS";
 /// The test that is such a process.
 pub const TEST: &str = "roles::a_process_of_another_test_plays_its_role";
@@ -64,7 +64,7 @@ fn end_with_the_test() {
     std::process::exit(1);
 }
 
-/// Asks a web server: fails if it does not answer.
+/// Sends a request to a web server: fails if it does not answer.
 fn fetch() {
     let address = std::env::var(ADDRESS).expect("the test says which").parse().expect("it is one");
     let mut stream = TcpStream::connect_timeout(&address, FETCH).expect("it answers");
@@ -180,7 +180,7 @@ fn segment(place: &Path) {
         times.answer(&asked);
         let states: String = network.devices().map(|device| format!("{} ", device.al_status().state)).collect();
         if states != before {
-            // Renamed, so that a reader never sees a part.
+            // Renamed, so that a reader never reads a part.
             fs::write(place.join("states.new"), &states).expect("it can be written");
             fs::rename(place.join("states.new"), place.join("states")).expect("it can be renamed");
             before = states;

@@ -45,14 +45,14 @@ const OBJECT: SdoAddress = SdoAddress::new(0x1018, 1);
 
 /// Source of the SDO requests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Asks {
+enum Load {
     None,
     AnotherThread,
     CyclicTask,
 }
 
-const KINDS: [(&str, Asks); 3] =
-    [("none", Asks::None), ("another-thread", Asks::AnotherThread), ("cyclic-task", Asks::CyclicTask)];
+const KINDS: [(&str, Load); 3] =
+    [("none", Load::None), ("another-thread", Load::AnotherThread), ("cyclic-task", Load::CyclicTask)];
 
 /// Both halves, the segment, and the results.
 struct Plant {
@@ -189,7 +189,7 @@ fn cyclic_half(
 }
 
 /// A run of this many cycles after the start.
-fn run(asks: Asks, cycles: u64) -> io::Result<Plant> {
+fn run(load: Load, cycles: u64) -> io::Result<Plant> {
     let (mut plant, mut exchange) = Plant::new()?;
     let mut begin = plant.segment.now();
     let mut started = 0;
@@ -202,7 +202,7 @@ fn run(asks: Asks, cycles: u64) -> io::Result<Plant> {
         }
     }
     let mut requests: Vec<SdoRequest> = Vec::new();
-    if asks == Asks::CyclicTask {
+    if load == Load::CyclicTask {
         // A request takes one or two cycles: with two request objects, one is started in each cycle.
         requests = (0..2).map(|at| plant.engine.create_sdo_request(SubDeviceId(1 + at), 4)).collect();
         for request in &mut requests {
@@ -214,7 +214,7 @@ fn run(asks: Asks, cycles: u64) -> io::Result<Plant> {
     plant.longest_wait = 0;
     let lost = exchange.counters().lost + exchange.counters().incomplete;
     for cycle in 0..cycles {
-        if asks == Asks::AnotherThread {
+        if load == Load::AnotherThread {
             let drive = 1 + cycle as usize % DRIVES;
             let pending = start_upload(&mut plant.engine, SubDeviceId(drive), OBJECT, LIMITS, 4);
             plant.waiting.push_back(pending);
@@ -247,8 +247,8 @@ fn main() -> ExitCode {
 
 /// The work that callgrind measures.
 fn watched(name: &str, cycles: &str) -> io::Result<()> {
-    let (_, asks) = KINDS.iter().find(|(kind, _)| *kind == name).ok_or(io::Error::other("no such kind"))?;
-    run(*asks, cycles.parse().map_err(io::Error::other)?).map(drop)
+    let (_, load) = KINDS.iter().find(|(kind, _)| *kind == name).ok_or(io::Error::other("no such kind"))?;
+    run(*load, cycles.parse().map_err(io::Error::other)?).map(drop)
 }
 
 /// Instructions of the cyclic half per cycle.
@@ -274,7 +274,7 @@ fn measure() -> io::Result<bool> {
     } else {
         println!("  skipped: instructions, for valgrind is not installed");
     }
-    let plant = run(Asks::AnotherThread, LOOKED_AT)?;
+    let plant = run(Load::AnotherThread, LOOKED_AT)?;
     figures.at_least("SDOs answered per second", plant.answered as f64 * 1000.0 / LOOKED_AT as f64, 990.0, "");
     // A frame that finds the interface busy is sent outside its window.
     figures.at_most("longest wait of a frame of process data behind another one", plant.longest_wait as f64, 0.0, "ns");

@@ -30,7 +30,7 @@ pub struct SyncInfo {
     pub pdos: Vec<PdoMapping>,
 }
 
-/// The SyncManagers and PDOs of a device, as a program names them that knows the device.
+/// The SyncManagers and PDOs of a device, as named by a program written for the device.
 pub fn syncs_of(device: &DeviceDescription) -> Vec<SyncInfo> {
     let mut syncs: Vec<SyncInfo> = Vec::new();
     for pdo in &device.pdos {

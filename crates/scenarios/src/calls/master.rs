@@ -161,7 +161,7 @@ impl Ecrt {
         result
     }
 
-    /// `ecrt_request_master`: reserves, waits for the scan, and asks all SubDevices for PREOP.
+    /// `ecrt_request_master`: reserves, waits for the scan, and requests PREOP of all SubDevices.
     ///
     /// # Errors
     /// [`Errno::Busy`]: it is reserved.

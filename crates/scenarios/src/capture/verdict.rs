@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::windows::Windows;
 
 /// Findings that are kept as text; all are counted.
-const TOLD: usize = 20;
+const REPORTED: usize = 20;
 
 /// Result of the checks.
 #[derive(Debug, Default)]
@@ -40,7 +40,7 @@ pub struct Verdict {
 impl Verdict {
     pub(super) fn find(&mut self, frame: usize, text: impl fmt::Display) {
         self.broken += 1;
-        if self.findings.len() < TOLD {
+        if self.findings.len() < REPORTED {
             self.findings.push(format!("frame {frame}: {text}"));
         }
     }

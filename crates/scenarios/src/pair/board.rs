@@ -31,7 +31,7 @@ pub struct Seen {
     pub incomplete: u64,
     /// Whether that of the last one was.
     pub is_last_complete: bool,
-    /// The ring as the ACTIVE sees it.
+    /// State of the ring in the ACTIVE.
     pub ring: RingState,
     /// What an INACTIVE has forwarded.
     pub forwarded: ForwardingCounters,
@@ -41,7 +41,7 @@ pub struct Seen {
     pub foreign: u64,
     /// The phase before, and when it ended.
     pub before: (Phase, Instant),
-    /// Whether the other MainDevice could take over, as the ACTIVE sees it.
+    /// Whether the other MainDevice could take over, as determined by the ACTIVE.
     pub is_other_ready: bool,
     /// Cycles of an INACTIVE that follows, since it began.
     pub followed: u64,

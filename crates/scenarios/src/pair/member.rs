@@ -1,4 +1,4 @@
-//! The program of a MainDevice of two: it joins, and takes over by the policy of the library.
+//! The program of one of two MainDevices: it joins, and takes over by the policy of the library.
 
 use std::ops::Range;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! One MainDevice of two: its engine, its application, and its way to forward.
+//! One of two MainDevices: its engine, its application, and its way to forward.
 
 use ringcat::standby::{
     Active, Class, EngineOptions, Forwarder, Partner, RoleControl, RoleRequest, StandbyOptions, class_of,
@@ -145,7 +145,7 @@ impl Controller {
         self.running.is_some()
     }
 
-    /// What it knows of the other one.
+    /// State of the other one.
     pub fn partner(&self) -> Partner {
         self.running.as_ref().map_or(Partner::Absent, |running| running.exchange.partner())
     }
@@ -259,7 +259,7 @@ impl Controller {
         }
     }
 
-    /// The steps to an application: as ACTIVE a scan, as INACTIVE what the other one knows.
+    /// The steps to an application: as ACTIVE a scan, as INACTIVE the knowledge of the other one.
     fn advance_start(&mut self) {
         if self.running.is_some() {
             return;

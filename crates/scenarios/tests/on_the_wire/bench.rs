@@ -54,7 +54,7 @@ pub fn program(name: &str) -> PathBuf {
 
 /// Directory of this profile's programs.
 pub fn target_directory() -> PathBuf {
-    let here = std::env::current_exe().expect("a test knows its path");
+    let here = std::env::current_exe().expect("the path of the test program");
     here.ancestors().nth(2).expect("tests lie in target/PROFILE/deps").to_owned()
 }
 
@@ -276,7 +276,7 @@ impl Bench {
     /// The simulator's delays so far.
     pub fn simulator_lateness(&self) -> SimulatorLateness {
         let status = self.order("status");
-        let line = status.lines().find(|line| line.starts_with("late wake-ups")).expect("it tells");
+        let line = status.lines().find(|line| line.starts_with("late wake-ups")).expect("a line of the status");
         let behind = |words: &str| {
             let rest = line.split(words).nth(1).unwrap_or_else(|| panic!("{words} in {line}"));
             rest.split([' ', ',']).next().and_then(|figure| figure.parse::<f64>().ok()).expect("a figure")

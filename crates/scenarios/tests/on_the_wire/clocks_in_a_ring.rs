@@ -1,5 +1,5 @@
 //! Distributed clocks on two interfaces in real time: host cables and one inner cable are cut and repaired. The
-//! simulator knows the true differences of the clocks. Inside each part the host has no influence; across both parts
+//! simulator has the true differences of the clocks. Inside each part the host has no influence; across both parts
 //! its sending jitter has.
 
 use std::time::{Duration, Instant};

@@ -182,7 +182,7 @@ fn pysoem_runs_its_ring_through_the_standby() {
 }
 
 #[test]
-fn a_standby_that_hears_no_frame_says_so() {
+fn a_standby_that_receives_no_frame_reports_it() {
     let Some((bench, second)) = ring_of_two() else { return };
     std::thread::sleep(PAUSE);
     let (said, errors) = second.interrupt();

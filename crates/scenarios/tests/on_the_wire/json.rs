@@ -122,7 +122,7 @@ fn a_standby_prints_the_documented_keys() {
     bench.simulate(&RING_OF_6.segment(), true);
     let arguments = ["standby", "--main", "second0", "--redundant", "main1", "--json"];
     let standby = bench.start_other_ringcat(&arguments);
-    // The ACTIVE sees all SubDevices on its main link only if the INACTIVE forwards.
+    // The ACTIVE reaches all SubDevices on its main link only if the INACTIVE forwards.
     let until = Instant::now() + Duration::from_secs(5);
     loop {
         let scan = bench.ringcat(&["scan", "--main", "main0", "--redundant", "active1", "--json"]);

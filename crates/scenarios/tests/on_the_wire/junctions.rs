@@ -82,7 +82,7 @@ fn a_local_ring_break_and_repair_are_reported_in_both_junction_modes() {
             assert!(!output.contains(trouble), "{mode}: {output}{errors}");
         }
         assert!(output.contains("stopped: outputs zero, all SubDevices in INIT"), "{mode}: {output}{errors}");
-        println!("--junction {mode}: three cables cut and mended, each reported once with both ends");
+        println!("--junction {mode}: three cables cut and repaired, each reported once with both ends");
     }
 }
 

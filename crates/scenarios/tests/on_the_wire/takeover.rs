@@ -48,7 +48,7 @@ impl Pair {
         self.bench.run_other_ringcat(&self.arguments(["second0", "main1"], more))
     }
 
-    /// The first one in OP as ACTIVE, the second one as its standby, which it knows to be ready.
+    /// The first one in OP as ACTIVE, the second one as its standby, which it reports as ready.
     fn in_op(&self, more: &[&str]) -> (Running, Running) {
         let first = self.first(more);
         await_op(&self.bench, 10);
@@ -160,7 +160,7 @@ fn an_active_that_loses_all_its_cables_yields_and_follows_when_they_are_back() {
 
 // covers: standby, MR-09, MR-10, MR-24, REQ016, REQ048
 #[test]
-fn of_two_controllers_that_each_have_half_the_ring_one_yields_when_it_is_mended() {
+fn of_two_controllers_with_half_the_ring_each_one_yields_when_it_is_repaired() {
     let Some(pair) = Pair::new() else { return };
     let (first, second) = pair.in_op(&[]);
     pair.bench.order("cut 4-5");
@@ -179,7 +179,7 @@ fn of_two_controllers_that_each_have_half_the_ring_one_yields_when_it_is_mended(
     assert!(!yields(&active), "{}", active.said().so_far());
     end(inactive, &["FAILED: collisions with another ACTIVE: "]);
     await_op(&pair.bench, 10);
-    // It may not have heard the other one, which yields in the cycle that shows the collision.
+    // It may not have received a frame of the other one, which yields in the cycle that shows the collision.
     end(active, &["stopped: outputs zero, all SubDevices in INIT"]);
     pair.all_are_in("INIT");
     pair.bench.show_simulator_lateness();

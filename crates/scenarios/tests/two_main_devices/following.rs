@@ -61,7 +61,7 @@ fn the_images_of_the_inactive_are_those_of_whole_cycles_of_the_active() {
 
 // covers: MR-12, MR-13, REQ031, REQ032, standby
 #[test]
-fn states_and_counts_of_the_inactive_are_those_that_the_active_sees() {
+fn states_and_counts_of_the_inactive_are_those_of_the_active() {
     let mut two = followed();
     two.controllers[0].engine.start_state_request(SubDeviceId(4), AlState::SafeOp);
     two.run(Duration::from_millis(200));

@@ -20,7 +20,7 @@ const PHASES: [u32; 5] = [0, 12, 60, 300, 900];
 /// Longest time without outputs when the ACTIVE fails: the time-out counts from its last process data, and the other
 /// one takes over with one of its cycles after that. In cycles, one less are missing.
 const LONGEST_GAP: Duration = CYCLE.saturating_mul(TIME_OUT_CYCLES + 1);
-/// The same where process data takes several frames: a cycle of which only the first has come counts as heard.
+/// The same where process data takes several frames: a cycle of which only the first has arrived restarts the time-out.
 const LONGEST_GAP_OF_SEVERAL: Duration = LONGEST_GAP.saturating_add(CYCLE);
 /// And when a role is handed over: a cycle, and what the grid moves by, because it is taken from master frames that
 /// have come through the ring after the process data.
@@ -72,7 +72,7 @@ fn gap_after(pair: &mut Pair, death: Death, phase: u32) -> Duration {
 
 // covers: standby, MR-07, MR-16, MR-18, MR-21, REQ005, 9.9
 #[test]
-fn an_active_that_dies_is_followed_by_the_other_one_within_the_time_out() {
+fn an_active_that_fails_is_followed_by_the_other_one_within_the_time_out() {
     let mut table = String::new();
     let rings = [
         (2, Host::First, LONGEST_GAP),
@@ -185,7 +185,7 @@ fn an_active_that_becomes_inactive_leaves_the_bus_to_the_time_out_of_the_other_o
     pair.run_cycles(30);
     let (gap, phases) = (pair.take_longest_gap(), Host::ALL.map(|host| pair.seen(host).phase));
     let here = format!("{gap:?}\n{}", pair.log());
-    // Nothing was heard since the change: a random pause of a time-out at most for the one that was ACTIVE.
+    // No frame has arrived since the change: a random pause of a time-out at most for the one that was ACTIVE.
     assert!(phases == [Phase::Inactive, Phase::Active] && gap <= LONGEST_GAP, "{here}");
     assert!(pair.all_in_op(), "{here}");
     pair.until_ready(Host::Second);
@@ -248,7 +248,7 @@ fn an_active_that_loses_its_links_and_gets_them_back_follows_the_other_one() {
 
 // covers: standby, MR-16, MR-25, MR-27
 #[test]
-fn an_active_that_no_other_one_replaces_goes_on_with_its_subdevices() {
+fn an_active_without_a_successor_continues_with_its_subdevices() {
     // How many cycles its links are down. Watchdogs expire after 100.
     for (count, down) in [(3, 0), (8, 0), (8, 30), (33, 30), (8, 150)] {
         let mut pair = Pair::of_members(13, ring_of_two(count, Host::First));

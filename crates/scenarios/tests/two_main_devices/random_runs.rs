@@ -21,7 +21,7 @@ use scenarios::segments::{descriptions, devices};
 
 use super::KINDS;
 
-/// Rounds of a run, each with a fault or two that are mended.
+/// Rounds of a run, each with one or two faults that end.
 const ROUNDS: u32 = 6;
 /// Cycles between a fault and its end, and after it.
 const CALM: u32 = 60;
@@ -37,7 +37,7 @@ enum Side {
 
 /// What happens.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Trouble {
+enum Disturbance {
     Cut(usize),
     /// Frames are lost on a cable.
     Losses(usize, u32),
@@ -53,36 +53,36 @@ enum Trouble {
     Yields,
 }
 
-impl Trouble {
+impl Disturbance {
     /// Any, in a ring with this number of cables.
-    fn any(dice: &mut Dice, cables: usize) -> Trouble {
+    fn any(dice: &mut Dice, cables: usize) -> Disturbance {
         let cable = dice.below(cables as u64) as usize;
         let side = *dice.pick(&[Side::Active, Side::Standby]);
         match dice.below(10) {
-            0 | 1 => Trouble::Cut(cable),
-            2 => Trouble::Losses(cable, 1 + dice.below(5) as u32),
-            3 | 4 => Trouble::Killed(side),
-            5 => Trouble::Hangs(side, 100 + dice.below(20_000)),
-            6 => Trouble::PowerOff(side),
-            7 => Trouble::LinksDown(side),
-            8 => Trouble::HandOver,
-            _ => *dice.pick(&[Trouble::BothActive, Trouble::Yields]),
+            0 | 1 => Disturbance::Cut(cable),
+            2 => Disturbance::Losses(cable, 1 + dice.below(5) as u32),
+            3 | 4 => Disturbance::Killed(side),
+            5 => Disturbance::Hangs(side, 100 + dice.below(20_000)),
+            6 => Disturbance::PowerOff(side),
+            7 => Disturbance::LinksDown(side),
+            8 => Disturbance::HandOver,
+            _ => *dice.pick(&[Disturbance::BothActive, Disturbance::Yields]),
         }
     }
 
     /// Longest time without outputs if nothing else happens; `detection` is the time until a port detects its link.
     fn longest_gap(self, detection: Duration) -> Duration {
-        // A cycle of which only the first frame has come counts as heard.
+        // A cycle of which only the first frame has arrived restarts the time-out.
         let time_out = CYCLE * (TIME_OUT_CYCLES + 2);
         match self {
-            Trouble::Killed(Side::Active) | Trouble::Hangs(Side::Active, _) | Trouble::PowerOff(Side::Active) => {
-                time_out
-            }
-            Trouble::LinksDown(Side::Active) | Trouble::Yields => time_out,
+            Disturbance::Killed(Side::Active)
+            | Disturbance::Hangs(Side::Active, _)
+            | Disturbance::PowerOff(Side::Active) => time_out,
+            Disturbance::LinksDown(Side::Active) | Disturbance::Yields => time_out,
             // What the guard takes, the detection of the link, and the cycles at the edge.
-            Trouble::Killed(Side::Standby) | Trouble::Hangs(Side::Standby, _) => GUARD + detection + 3 * CYCLE,
-            Trouble::Losses(_, count) => CYCLE * (count + 2),
-            Trouble::HandOver => CYCLE + Duration::from_micros(600),
+            Disturbance::Killed(Side::Standby) | Disturbance::Hangs(Side::Standby, _) => GUARD + detection + 3 * CYCLE,
+            Disturbance::Losses(_, count) => CYCLE * (count + 2),
+            Disturbance::HandOver => CYCLE + Duration::from_micros(600),
             _ => 3 * CYCLE,
         }
     }
@@ -95,7 +95,7 @@ struct Run {
     cables: usize,
     detection: Duration,
     /// The faults of this round that have not ended, each with the host that it concerns.
-    open: Vec<(Trouble, Host)>,
+    open: Vec<(Disturbance, Host)>,
 }
 
 impl Run {
@@ -123,68 +123,73 @@ impl Run {
     }
 
     /// A fault begins within the next cycle.
-    fn begin(&mut self, trouble: Trouble) {
+    fn begin(&mut self, disturbance: Disturbance) {
         let moment = Duration::from_nanos(self.dice.below(CYCLE.as_nanos() as u64));
         let active = self.active();
-        let host = match trouble {
-            Trouble::Killed(side) | Trouble::Hangs(side, _) | Trouble::PowerOff(side) | Trouble::LinksDown(side) => {
+        let host = match disturbance {
+            Disturbance::Killed(side)
+            | Disturbance::Hangs(side, _)
+            | Disturbance::PowerOff(side)
+            | Disturbance::LinksDown(side) => {
                 if side == Side::Active {
                     active
                 } else {
                     active.other()
                 }
             }
-            Trouble::BothActive => active.other(),
+            Disturbance::BothActive => active.other(),
             _ => active,
         };
         let pair = &mut self.pair;
-        pair.say(format!("{trouble:?} of {host:?} in {moment:?}"));
-        match trouble {
-            Trouble::Cut(cable) => pair.fault_in(moment, Fault::Cut(CableId(cable))),
-            Trouble::Losses(cable, count) => {
+        pair.say(format!("{disturbance:?} of {host:?} in {moment:?}"));
+        match disturbance {
+            Disturbance::Cut(cable) => pair.fault_in(moment, Fault::Cut(CableId(cable))),
+            Disturbance::Losses(cable, count) => {
                 pair.fault_in(moment, Fault::Drop { cable: CableId(cable), direction: None, count });
             }
-            Trouble::Killed(_) => {
+            Disturbance::Killed(_) => {
                 pair.hosts().run_for(moment);
                 pair.kill(host);
             }
-            Trouble::Hangs(_, us) => {
+            Disturbance::Hangs(_, us) => {
                 pair.fault_in(moment, Fault::StopHost(host, true));
                 pair.fault_in(moment + Duration::from_micros(us), Fault::StopHost(host, false));
             }
-            Trouble::PowerOff(_) => pair.fault_in(moment, Fault::PowerHostOff(host)),
-            Trouble::LinksDown(_) => {
+            Disturbance::PowerOff(_) => pair.fault_in(moment, Fault::PowerHostOff(host)),
+            Disturbance::LinksDown(_) => {
                 pair.hosts().run_for(moment);
                 switch(pair, host, false);
             }
-            Trouble::HandOver => pair.request(host, RoleRequest::HandOver),
-            Trouble::BothActive => pair.request(host, RoleRequest::Active),
-            Trouble::Yields => pair.request(host, RoleRequest::Inactive),
+            Disturbance::HandOver => pair.request(host, RoleRequest::HandOver),
+            Disturbance::BothActive => pair.request(host, RoleRequest::Active),
+            Disturbance::Yields => pair.request(host, RoleRequest::Inactive),
         }
-        self.open.push((trouble, host));
+        self.open.push((disturbance, host));
     }
 
     /// Ends all faults, in any order.
     fn mend(&mut self) {
         while !self.open.is_empty() {
             let at = self.dice.below(self.open.len() as u64) as usize;
-            let (trouble, host) = self.open.swap_remove(at);
-            self.mend_one(trouble, host);
+            let (disturbance, host) = self.open.swap_remove(at);
+            self.end_one(disturbance, host);
             let pause = if self.open.is_empty() { 0 } else { self.dice.below(40) as u32 };
             self.pair.run_cycles(pause);
         }
     }
 
-    fn mend_one(&mut self, trouble: Trouble, host: Host) {
+    fn end_one(&mut self, disturbance: Disturbance, host: Host) {
         let pair = &mut self.pair;
-        match trouble {
-            Trouble::Cut(cable) => pair.heal(cable),
-            Trouble::Losses(cable, _) => pair.fault(Fault::Drop { cable: CableId(cable), direction: None, count: 0 }),
-            Trouble::PowerOff(_) => {
+        match disturbance {
+            Disturbance::Cut(cable) => pair.heal(cable),
+            Disturbance::Losses(cable, _) => {
+                pair.fault(Fault::Drop { cable: CableId(cable), direction: None, count: 0 })
+            }
+            Disturbance::PowerOff(_) => {
                 pair.hosts().with_network(|network| down(network, host));
                 pair.fault(Fault::PowerHostOn(host));
             }
-            Trouble::LinksDown(_) => switch(pair, host, true),
+            Disturbance::LinksDown(_) => switch(pair, host, true),
             _ => {}
         }
         self.restart_if_dead(host);
@@ -192,8 +197,9 @@ impl Run {
 
     /// A service manager starts a program again that has ended, or whose interfaces the guard has switched off.
     fn restart_if_dead(&mut self, host: Host) {
-        let is_open = |(trouble, hit): &(Trouble, Host)| {
-            *hit == host && matches!(trouble, Trouble::PowerOff(_) | Trouble::Killed(_) | Trouble::Hangs(..))
+        let is_open = |(disturbance, hit): &(Disturbance, Host)| {
+            *hit == host
+                && matches!(disturbance, Disturbance::PowerOff(_) | Disturbance::Killed(_) | Disturbance::Hangs(..))
         };
         if self.open.iter().any(is_open) {
             return;
@@ -224,29 +230,29 @@ impl Run {
 
     /// One fault, from a ring that is whole.
     fn round(&mut self) {
-        let trouble = Trouble::any(&mut self.dice, self.cables);
+        let disturbance = Disturbance::any(&mut self.dice, self.cables);
         self.pair.take_longest_gap();
         let before = Host::ALL.map(|host| self.pair.seen(host).cold_takeovers);
-        self.begin(trouble);
+        self.begin(disturbance);
         self.pair.run_cycles(CALM);
         let gap = self.pair.take_longest_gap();
-        let most = trouble.longest_gap(self.detection);
-        assert!(gap <= most, "{trouble:?}: {gap:?} without outputs, at most {most:?}\n{}", self.pair.log());
-        assert!(self.pair.all_in_op(), "{trouble:?}: {:?}\n{}", self.pair.not_in_op(), self.pair.log());
+        let most = disturbance.longest_gap(self.detection);
+        assert!(gap <= most, "{disturbance:?}: {gap:?} without outputs, at most {most:?}\n{}", self.pair.log());
+        assert!(self.pair.all_in_op(), "{disturbance:?}: {:?}\n{}", self.pair.not_in_op(), self.pair.log());
         self.mend();
         self.until_whole();
         let gap = self.pair.take_longest_gap();
-        assert!(gap <= 3 * CYCLE, "{trouble:?} is over: {gap:?} without outputs\n{}", self.pair.log());
+        assert!(gap <= 3 * CYCLE, "{disturbance:?} is over: {gap:?} without outputs\n{}", self.pair.log());
         let cold = Host::ALL.map(|host| self.pair.seen(host).cold_takeovers);
-        assert_eq!(cold, before, "{trouble:?}: a takeover through INIT\n{}", self.pair.log());
+        assert_eq!(cold, before, "{disturbance:?}: a takeover through INIT\n{}", self.pair.log());
     }
 
     /// A second fault before the first one has ended.
     fn double_round(&mut self) {
-        let first = Trouble::any(&mut self.dice, self.cables);
-        let second = Trouble::any(&mut self.dice, self.cables);
+        let first = Disturbance::any(&mut self.dice, self.cables);
+        let second = Disturbance::any(&mut self.dice, self.cables);
         // Two cuts make two networks, each with its ACTIVE.
-        if let (Trouble::Cut(_), Trouble::Cut(_)) = (first, second) {
+        if let (Disturbance::Cut(_), Disturbance::Cut(_)) = (first, second) {
             return self.round();
         }
         self.begin(first);
@@ -296,9 +302,9 @@ fn seeds_0_to_20_hold_under_faults_of_both_maindevices_and_the_cables() {
     run_all(0..20);
 }
 
-/// Faults that were found: an ACTIVE went through INIT although it had heard no other one (1, 2); two scanned at the
-/// same time for ever (131); no more rounds of reads after a role that ended during one (826); no yield after a
-/// takeover during a scan of the other MainDevice (1307); a takeover each time-out during such a scan (4614).
+/// Faults that were found: an ACTIVE went through INIT although it had received no frame of another one (1, 2); two
+/// scanned at the same time for ever (131); no more rounds of reads after a role that ended during one (826); no yield
+/// after a takeover during a scan of the other MainDevice (1307); a takeover each time-out during such a scan (4614).
 // covers: standby, MR-10, MR-16
 #[test]
 fn seeds_that_found_faults_hold() {

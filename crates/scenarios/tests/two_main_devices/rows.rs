@@ -70,7 +70,7 @@ fn a_role_is_handed_over_with_any_cable_cut() {
 
 // covers: 9.7.5, MR-24, standby
 #[test]
-fn a_dead_active_and_a_cut_cable_leave_the_subdevices_that_are_in_reach() {
+fn a_failed_active_and_a_cut_cable_leave_the_subdevices_in_reach() {
     // The line begins at the first MainDevice. Without the one that fails the other one reaches a line from its own
     // end.
     for active in [0, 1] {

@@ -12,7 +12,7 @@ use super::{declare, ring_of_two, standby};
 
 // covers: MR-01, MR-12, MR-13, FR-08, REQ031, REQ032, standby
 #[test]
-fn an_inactive_learns_what_it_needs_and_follows_without_a_frame_of_its_own() {
+fn an_inactive_collects_what_it_needs_and_follows_without_a_frame_of_its_own() {
     for near in [Host::First, Host::Second] {
         let mut two = Two::in_op(ring_of_two(8, near), declare, standby());
         two.run(Duration::from_millis(200));

@@ -282,11 +282,11 @@ fn the_check_finds_missing_duplicated_and_late_copies() {
         packets.push(packets[place].clone());
     });
     assert_found(&twice, "is back for the second time");
-    let stranger = tampered(&capture, |packets| {
+    let altered = tampered(&capture, |packets| {
         let last = packets.iter_mut().rfind(|packet| !packet.sent).expect("something came back");
         last.bytes[17] ^= 0x40;
     });
-    assert_found(&stranger, "was never sent from here");
+    assert_found(&altered, "was never sent from here");
     let jump = tampered(&capture, |packets| {
         let (place, _) = sent_with(packets, LRD);
         packets[place].bytes[7] = packets[place].bytes[7].wrapping_add(3);

@@ -172,11 +172,11 @@ fn others_work(world: &World, latched: &[u64]) -> Result<(), String> {
 /// Checks all variants of an image, of seed 1 or of those in the environment.
 fn evaluate_all(sound: &DeviceDescription, count: u64, tally: &mut Tally) {
     for seed in seeds::from_environment().unwrap_or(1..2) {
-        judge_seed(sound, seed, count, tally);
+        check_seed(sound, seed, count, tally);
     }
 }
 
-fn judge_seed(sound: &DeviceDescription, seed: u64, count: u64, tally: &mut Tally) {
+fn check_seed(sound: &DeviceDescription, seed: u64, count: u64, tally: &mut Tally) {
     let image = sii_image::build(sound);
     let mut dice = Dice::new(seed);
     for number in 0..count {

@@ -162,7 +162,7 @@ fn objects_follow_a_break_damaged_frames_and_a_loss_until_reset() {
     world.evaluate_latched(false);
     world.corrupt(CableId(2), 20);
     world.run_cycles(40);
-    assert!(number(&mut world, 0xA002, 10) > 0, "at the port that sees them first");
+    assert!(number(&mut world, 0xA002, 10) > 0, "at the port that receives them first");
     world.cut(CableId(3));
     world.run_cycles(50);
     assert_eq!(number(&mut world, 0xA002, 7), 0, "no SubDevice there");

@@ -113,7 +113,7 @@ fn a_killed_standby_without_a_guard_takes_the_bus_until_its_links_go_down() {
 
 // covers: standby, MR-21
 #[test]
-fn the_guard_of_a_standby_that_dies_or_hangs_costs_its_limit_and_two_cycles() {
+fn the_guard_of_a_standby_that_fails_or_hangs_costs_its_limit_and_two_cycles() {
     for (seed, near) in [(4, Host::First), (5, Host::Second)] {
         for phase in PHASES {
             for dies in [true, false] {
@@ -206,7 +206,7 @@ fn two_inactive_maindevices_send_nothing_and_neither_becomes_active() {
 
 // covers: standby, MR-21
 #[test]
-fn a_dead_standby_and_a_cut_leave_the_active_the_subdevices_on_its_side() {
+fn a_failed_standby_and_a_cut_leave_the_active_the_subdevices_on_its_side() {
     // Those with outputs behind the cut leave OP; the others have no watchdog.
     for (near, behind) in [(Host::First, vec![4, 5, 6, 7]), (Host::Second, vec![1, 3])] {
         let mut pair = Pair::new(13, ring_of_two(13, 8, near));

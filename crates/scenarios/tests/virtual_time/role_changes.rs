@@ -1,5 +1,5 @@
 //! The role changes while procedures run: with INACTIVE all of them end and nothing is sent, with ACTIVE the MainDevice
-//! goes on with what it knows (protocol 9.11).
+//! continues with its knowledge (protocol 9.11).
 
 use std::time::Duration;
 
@@ -56,7 +56,7 @@ fn sent(frames: &Frames) -> usize {
     frames.take().into_iter().filter(|passed| passed.is_sent).count()
 }
 
-/// Begins procedures of all kinds; the result tells whether any of them still runs.
+/// Begins procedures of all kinds; the result is whether any of them still runs.
 fn begin(engine: &mut Engine, number: usize) -> Box<dyn FnMut() -> bool> {
     fn running<T: 'static>(pending: ringcat::Pending<T>) -> Box<dyn FnMut() -> bool> {
         Box::new(move || pending.is_running())

@@ -99,7 +99,7 @@ fn objects_and_idns_are_written_at_their_transitions_in_the_declared_order() {
     assert_eq!(written(&world), expected());
     let device = world.network().device(DeviceIndex(DRIVE));
     let idn = |drive, number| {
-        let server = device.application.servers().soe().expect("it speaks SoE");
+        let server = device.application.servers().soe().expect("it supports SoE");
         server.idn(drive, Idn::standard(0, number)).expect("it is there").value.clone()
     };
     assert_eq!((idn(0, 1), idn(1, 36)), (vec![0xF4, 0x01], vec![100, 0, 0, 0]));

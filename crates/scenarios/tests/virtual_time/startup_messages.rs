@@ -67,7 +67,7 @@ fn read(number: u16) -> IdnRead {
 fn value(number: u16) -> Vec<u8> {
     let world = world(&[]);
     let device = world.network().device(DeviceIndex(DRIVE));
-    let server = device.application.servers().soe().expect("it speaks SoE");
+    let server = device.application.servers().soe().expect("it supports SoE");
     server.idn(0, Idn::standard(0, number)).expect("it is there").value.clone()
 }
 

@@ -158,7 +158,7 @@ fn no_output_comes_twice_across_sync0_at_any_shift_in_lines_and_rings() {
     }
 }
 
-/// What the check above sees: signals that came at other times than declared would be between two tries.
+/// Shows that the check above works: signals that came at other times than declared would be between two tries.
 // covers: lost-frames
 #[test]
 fn outputs_come_twice_across_signals_that_are_later_than_declared() {

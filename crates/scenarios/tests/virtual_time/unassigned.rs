@@ -83,8 +83,8 @@ fn unassigned_subdevices_with_an_old_address_do_not_share_it() {
 // covers: identity
 #[test]
 fn a_subdevice_with_the_address_of_a_member_gets_another_one() {
-    for (stranger, member) in [(5, 1), (5, 4), (0, 1)] {
-        let kinds = if stranger == 0 { 1..6 } else { 0..5 };
+    for (unassigned, member) in [(5, 1), (5, 4), (0, 1)] {
+        let kinds = if unassigned == 0 { 1..6 } else { 0..5 };
         let declare = |scan: &ringcat::Scan| {
             let mut declaration = automatic(&scan.subdevices[kinds.clone()], CYCLE);
             for (config, position) in declaration.subdevices.iter_mut().zip(kinds.clone()) {
@@ -100,11 +100,11 @@ fn a_subdevice_with_the_address_of_a_member_gets_another_one() {
         let bus = world.application().engine().bus();
         let taken = before[member].to_le_bytes();
         world.application_mut().engine_mut().spawn(async move {
-            let _ = bus.apwr(Position(stranger), map::STATION_ADDRESS, &taken).await;
+            let _ = bus.apwr(Position(unassigned), map::STATION_ADDRESS, &taken).await;
         });
         world.run_cycles(1000);
         let after = stations(&world);
-        assert_eq!(after[kinds.clone()], before[kinds], "stranger {stranger} with the address of {member}");
+        assert_eq!(after[kinds.clone()], before[kinds], "unassigned {unassigned} with the address of {member}");
         assert_eq!(world.left_op(mark), []);
     }
 }

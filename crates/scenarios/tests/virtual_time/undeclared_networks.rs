@@ -4,8 +4,8 @@
 use std::time::Duration;
 
 use ringcat::{
-    Address, Application, Declaration, DomainId, Error, LastOutputs, MainDevice, Options, Position, Services,
-    SubDeviceConfig, SubDeviceId,
+    Address, Application, Declaration, DomainId, Error, LastOutputs, MainDevice, Options, Position, SubDeviceConfig,
+    SubDeviceId,
 };
 use ringcat_engine::main_device::{EthernetSubDevice, MainDevice as Engine};
 use ringcat_sim::cable::DeviceIndex;
@@ -74,7 +74,7 @@ fn station(network: &Network, device: u16) -> u16 {
 
 impl Bench for MainDevice<Tap> {
     fn ask<T: Send + 'static>(&mut self, act: impl FnOnce(&mut Engine) -> T + Send + 'static) -> T {
-        self.immediately(act)
+        act(self.engine_mut())
     }
 
     fn pass(&mut self, ms: u64) {
@@ -88,7 +88,7 @@ impl Bench for MainDevice<Tap> {
 
 impl Bench for Application<Tap> {
     fn ask<T: Send + 'static>(&mut self, act: impl FnOnce(&mut Engine) -> T + Send + 'static) -> T {
-        self.immediately(act)
+        act(self.engine_mut())
     }
 
     fn pass(&mut self, ms: u64) {

@@ -311,7 +311,7 @@ impl Unit {
         }
     }
 
-    /// Applies the begin or end of an access.
+    /// Applies the start or end of an access.
     fn finish(&mut self, role: Role, opened: bool, completed: bool) -> Completion {
         if opened {
             match role {

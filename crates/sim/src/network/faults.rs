@@ -101,9 +101,9 @@ impl Network {
     fn disturb_idle(&mut self, cable: CableId, direction: Option<Direction>, count: u32) {
         for candidate in Direction::ALL {
             let leg = self.leg_mut(cable, candidate);
-            let hears = leg.signal() && leg.detected && direction.is_none_or(|wanted| wanted == candidate);
+            let receives = leg.signal() && leg.detected && direction.is_none_or(|wanted| wanted == candidate);
             let Endpoint::Device(device, port) = leg.to else { continue };
-            if hears {
+            if receives {
                 (0..count).for_each(|_| self.device_mut(device).controller.count_symbol_error(port));
             }
         }

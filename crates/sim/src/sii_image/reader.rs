@@ -158,9 +158,9 @@ fn pdos(sii: &Sii<'_>, sync_managers: &[SyncManagerDescription]) -> Vec<PdoDescr
 fn mailbox(sii: &Sii<'_>, sync_managers: &[SyncManagerDescription]) -> Option<MailboxDescription> {
     let header = sii.header();
     let standard = Some(header.standard_mailbox).filter(is_possible);
-    let speaks = header.protocols.0 != 0;
+    let has_protocols = header.protocols.0 != 0;
     let standard =
-        standard.or_else(|| of_sync_managers(sync_managers).filter(|layout| speaks && is_possible(layout)))?;
+        standard.or_else(|| of_sync_managers(sync_managers).filter(|layout| has_protocols && is_possible(layout)))?;
     let number = |kind| sync_managers.iter().position(|entry| entry.kind == kind);
     let numbers = number(SyncManagerKind::MailboxOut).zip(number(SyncManagerKind::MailboxIn));
     let (out, inward) = numbers.unwrap_or((0, 1));

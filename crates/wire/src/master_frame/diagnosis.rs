@@ -3,7 +3,7 @@
 use super::MasterFrameError;
 use super::cursor::{Reader, Writer};
 
-/// What the ACTIVE sees of the segment: a fixed part, then one [`DomainRecord`] per domain.
+/// State of the segment, from the ACTIVE: a fixed part, then one [`DomainRecord`] per domain.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Diagnosis {
     /// State of the ring: 0 unknown, 1 closed, 2 open.

@@ -1,7 +1,7 @@
 //! The program of each controller: it joins the ring, and writes the number of its cycle to all outputs, in both roles.
 //!
-//! In: links of a host. Out: a board with what it sees of itself. As ACTIVE it keeps its images for the other one,
-//! which compares its own with them.
+//! In: links of a host. Out: a board with the state of the controller. As ACTIVE it keeps its images; the other
+//! controller compares its own images with them.
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -23,20 +23,20 @@ const DOMAIN: DomainId = DomainId(0);
 /// Images of the ACTIVE that are kept: the INACTIVE shows one of the last cycles.
 const KEPT: usize = 8;
 
-/// What a controller shows of itself.
+/// State of a controller.
 #[derive(Debug, Default)]
 pub struct Board {
     /// Bytes 3 to 5 of its addresses.
     pub identity: [u8; 3],
     /// Its role, while it has an application.
     pub role: Option<MainDeviceRole>,
-    /// Requests for another one.
+    /// Requests another role.
     pub control: Option<RoleControl>,
-    /// As ACTIVE: the other one could take over.
+    /// As ACTIVE: the other controller is ready to take over.
     pub is_other_ready: bool,
     /// As ACTIVE: all SubDevices are in OP.
     pub is_settled: bool,
-    /// The ring as it sees it.
+    /// State of the ring.
     pub ring: RingState,
     /// Why it has ended.
     pub failure: Option<String>,
@@ -65,10 +65,10 @@ pub struct Place {
     pub drive: Option<(usize, usize)>,
 }
 
-/// What both controllers know of the segment.
+/// Process data of the segment, the same for both controllers.
 #[derive(Debug, Default)]
 pub struct Layout {
-    /// Of each SubDevice its process data.
+    /// Process data by SubDevice.
     pub places: Vec<Place>,
     /// Bytes of all process data.
     pub bytes: usize,
@@ -79,7 +79,7 @@ pub struct Layout {
 pub struct Shared {
     boards: [Mutex<Board>; 2],
     images: Mutex<Images>,
-    /// What they know of the segment, when one of them has an application.
+    /// Process data of the segment, once one of them has an application.
     pub layout: OnceLock<Layout>,
 }
 
@@ -187,14 +187,14 @@ fn work(data: &mut ProcessData<'_>, layout: &Layout, drives: &mut [Drive], cycle
 /// Which images are compared.
 #[derive(Debug, Default)]
 struct Comparison {
-    /// The ACTIVE has reported that this one could take over: before that its image may be empty.
+    /// The ACTIVE has reported that this controller is ready to take over; before that, its image may be empty.
     has_begun: bool,
     was_active: bool,
 }
 
 impl Comparison {
-    /// Whether that of this cycle is. In the first cycle after its time as ACTIVE it shows the inputs that this
-    /// controller has received last itself.
+    /// Whether the image of this cycle is compared. In the first cycle after its time as ACTIVE it contains the
+    /// inputs that this controller received last itself.
     fn is_due(&mut self, data: &ProcessData<'_>, is_ready: bool) -> bool {
         self.has_begun |= is_ready;
         let is_active = data.role() == MainDeviceRole::Active;

@@ -1,5 +1,5 @@
-//! The end of the demonstration with two controllers: a table of what each SubDevice noticed, what was checked, and the
-//! keys of JSON.
+//! The report at the end of the demonstration with two controllers: a table with the effects on each SubDevice, the
+//! checks, and the keys of JSON.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use ringcat::{Instant, MainDeviceRole};
 
 use super::super::report::Reporter;
 use super::controller::Shared;
-use super::judge::{Judge, Watched};
+use super::measurement::{Measurement, Watched};
 use super::steps::{STEPS, Step, Times, name};
 use crate::json::demo::Check;
 use crate::json::demo_standby::{DemoStandby, Noticed, StandbyIncident};
@@ -31,24 +31,24 @@ pub struct Incident {
     pub step: Step,
     /// When it began.
     pub at: Instant,
-    /// The same in words.
+    /// Text for people.
     pub text: String,
-    /// What was not as expected at its end.
+    /// Difference from the expected state at its end.
     pub failure: Option<String>,
 }
 
-/// What the demonstration has shown.
+/// Results of the demonstration.
 #[derive(Debug)]
 pub struct Outcome<'a> {
-    /// What the SubDevices have noticed; `None` where not all reached OP.
-    pub judge: Option<&'a Judge>,
-    /// What happened.
+    /// Effects on the SubDevices; `None` if not all reached OP.
+    pub measurement: Option<&'a Measurement>,
+    /// The incidents.
     pub incidents: &'a [Incident],
     /// Times on which limits depend.
     pub times: Times,
     /// Names of the SubDevices.
     pub names: &'a Names,
-    /// What the controllers have shown.
+    /// States and images of the controllers.
     pub shared: &'a Shared,
     /// Largest delay of virtual time behind the wall clock, if it waited for that.
     pub late: Option<Duration>,
@@ -57,19 +57,19 @@ pub struct Outcome<'a> {
 impl Outcome<'_> {
     /// Prints the table and what was checked.
     pub fn summary(&self, reporter: &mut Reporter) -> Verdict {
-        let Some(judge) = self.judge else { return Verdict::Failed("nothing was judged".to_owned()) };
-        self.table(judge, reporter);
-        let checks = self.checks(judge);
+        let Some(measurement) = self.measurement else { return Verdict::Failed("nothing was measured".to_owned()) };
+        self.table(measurement, reporter);
+        let checks = self.checks(measurement);
         let failed = checks.iter().filter(|check| !check.held).map(|check| check.text.clone()).collect();
         reporter.say("");
         checks.into_iter().for_each(|check| reporter.check(check));
-        for text in &judge.described {
+        for text in &measurement.described {
             reporter.say(&format!("         {text}"));
         }
         Verdict::of(failed, "everything held")
     }
 
-    fn table(&self, judge: &Judge, reporter: &mut Reporter) {
+    fn table(&self, measurement: &Measurement, reporter: &mut Reporter) {
         let limits = self.limits();
         reporter.say("\nlongest time between outputs in each SubDevice, in ms; without outputs: between");
         reporter.say("inputs. AL: changes of its state. WD: watchdogs that expired.\n");
@@ -82,15 +82,15 @@ impl Outcome<'_> {
             let times: Vec<String> = (0..STEPS.len()).map(|at| longest.get(at).map_or("-".to_owned(), ms)).collect();
             format!("{head:<16}{}{changes:>4}{watchdogs:>4}", cells(&times))
         };
-        if judge.watched.len() <= LISTED {
-            for (position, it) in judge.watched.iter().enumerate() {
+        if measurement.watched.len() <= LISTED {
+            for (position, it) in measurement.watched.iter().enumerate() {
                 let name: String = self.names.0.get(position).map_or("", String::as_str).chars().take(NAME).collect();
                 reporter.say(&line(&format!("{position:>3} {name}"), &it.longest, it.state_changes, it.watchdogs));
             }
         } else {
-            let longest: Vec<Duration> = (0..STEPS.len()).map(|at| judge.longest(at)).collect();
-            let sum = |of: fn(&Watched) -> u32| judge.watched.iter().map(of).sum();
-            let head = format!("all {}", judge.watched.len());
+            let longest: Vec<Duration> = (0..STEPS.len()).map(|at| measurement.longest(at)).collect();
+            let sum = |of: fn(&Watched) -> u32| measurement.watched.iter().map(of).sum();
+            let head = format!("all {}", measurement.watched.len());
             reporter.say(&line(&head, &longest, sum(|it| it.state_changes), sum(|it| it.watchdogs)));
         }
         let limits: Vec<String> = limits.iter().map(ms).collect();
@@ -105,17 +105,17 @@ impl Outcome<'_> {
         STEPS.iter().map(|step| step.limit(&self.times)).collect()
     }
 
-    fn checks(&self, judge: &Judge) -> Vec<Check> {
-        let mut checks = of_subdevices(judge);
-        checks.extend(self.of_times(judge));
-        checks.extend(self.of_controllers(judge));
+    fn checks(&self, measurement: &Measurement) -> Vec<Check> {
+        let mut checks = of_subdevices(measurement);
+        checks.extend(self.of_times(measurement));
+        checks.extend(self.of_controllers(measurement));
         checks
     }
 
     /// Times between outputs.
-    fn of_times(&self, judge: &Judge) -> Vec<Check> {
+    fn of_times(&self, measurement: &Measurement) -> Vec<Check> {
         let limits = self.limits();
-        let longest: Vec<Duration> = (0..STEPS.len()).map(|at| judge.longest(at)).collect();
+        let longest: Vec<Duration> = (0..STEPS.len()).map(|at| measurement.longest(at)).collect();
         let beyond = (0..STEPS.len()).filter(|at| longest[*at] > limits[*at]);
         let mut checks: Vec<Check> = beyond
             .map(|at| {
@@ -137,8 +137,8 @@ impl Outcome<'_> {
     }
 
     /// Roles and images of both controllers.
-    fn of_controllers(&self, judge: &Judge) -> Vec<Check> {
-        let (together, images) = (judge.together, self.shared.images());
+    fn of_controllers(&self, measurement: &Measurement) -> Vec<Check> {
+        let (together, images) = (measurement.together, self.shared.images());
         let (compared, different) = (images.compared, images.different);
         let mut checks = vec![
             Check {
@@ -165,20 +165,23 @@ impl Outcome<'_> {
 
     /// The keys of JSON.
     pub fn data(&self, checks: &[Check]) -> DemoStandby {
-        let judge = self.judge;
+        let measurement = self.measurement;
         let incidents = self.incidents.iter().enumerate().map(|(at, incident)| StandbyIncident {
             time_ns: incident.at.since(Instant(0)).as_nanos() as u64,
             text: incident.text.clone(),
-            longest_ns: judge.map_or(0, |judge| nanoseconds(judge.longest(at))),
+            longest_ns: measurement.map_or(0, |measurement| nanoseconds(measurement.longest(at))),
             limit_ns: nanoseconds(incident.step.limit(&self.times)),
         });
-        let noticed = judge.iter().flat_map(|judge| &judge.watched).enumerate().map(|(subdevice, it)| Noticed {
-            subdevice,
-            name: self.names.0.get(subdevice).cloned().unwrap_or_default(),
-            longest_ns: it.longest.iter().copied().map(nanoseconds).collect(),
-            state_changes: it.state_changes,
-            expired_watchdogs: it.watchdogs,
-        });
+        let noticed =
+            measurement.iter().flat_map(|measurement| &measurement.watched).enumerate().map(|(subdevice, it)| {
+                Noticed {
+                    subdevice,
+                    name: self.names.0.get(subdevice).cloned().unwrap_or_default(),
+                    longest_ns: it.longest.iter().copied().map(nanoseconds).collect(),
+                    state_changes: it.state_changes,
+                    expired_watchdogs: it.watchdogs,
+                }
+            });
         let is_active = |host| self.shared.board(host).role == Some(MainDeviceRole::Active);
         DemoStandby {
             cycle_ns: nanoseconds(self.times.cycle),
@@ -191,29 +194,29 @@ impl Outcome<'_> {
     }
 }
 
-/// What was seen in the SubDevices themselves.
-fn of_subdevices(judge: &Judge) -> Vec<Check> {
-    let sum = |of: fn(&Watched) -> u32| -> u32 { judge.watched.iter().map(of).sum() };
+/// Checks of the values measured inside the SubDevices.
+fn of_subdevices(measurement: &Measurement) -> Vec<Check> {
+    let sum = |of: fn(&Watched) -> u32| -> u32 { measurement.watched.iter().map(of).sum() };
     let (changes, watchdogs) = (sum(|it| it.state_changes), sum(|it| it.watchdogs));
     let text = match (changes, watchdogs) {
         (0, 0) => "no SubDevice left OP, no watchdog expired".to_owned(),
         _ => format!("changes of states: {changes}, expired watchdogs: {watchdogs}"),
     };
     let mut checks = vec![Check { held: changes == 0 && watchdogs == 0, text }];
-    let drives: Vec<&Watched> = judge.watched.iter().filter(|it| it.is_drive()).collect();
+    let drives: Vec<&Watched> = measurement.watched.iter().filter(|it| it.is_drive()).collect();
     if !drives.is_empty() {
         let still: usize = drives.iter().map(|drive| drive.still()).sum();
-        let are_enabled = judge.disabled == 0 && drives.iter().all(|drive| drive.was_enabled);
+        let are_enabled = measurement.disabled == 0 && drives.iter().all(|drive| drive.was_enabled);
         let held = are_enabled && still == 0;
         let text = match (are_enabled, still) {
             (true, 0) => "the drives stayed enabled and got new targets in each incident".to_owned(),
             (true, _) => format!("drives got no new target in {still} incidents"),
-            (false, _) => format!("drives were not enabled, in {} cycles in all", judge.disabled),
+            (false, _) => format!("drives were not enabled, in {} cycles in all", measurement.disabled),
         };
         checks.push(Check { held, text });
     }
-    let (checked, outdated) = (judge.checked, judge.outdated);
-    if judge.watched.iter().any(Watched::has_outputs) {
+    let (checked, outdated) = (measurement.checked, measurement.outdated);
+    if measurement.watched.iter().any(Watched::has_outputs) {
         let text = format!("no output went back: {checked} checked, {outdated} older than allowed");
         checks.push(Check { held: checked > 0 && outdated == 0, text });
     } else {

@@ -1,4 +1,4 @@
-//! What happens to both controllers and to the ring, one after another, and what that may cost.
+//! The incidents of the demonstration in their order, and the longest time between outputs that each may cause.
 
 use std::time::Duration;
 
@@ -22,7 +22,7 @@ pub enum Step {
     Repair,
     /// The computer of the ACTIVE loses its power.
     PowerOff,
-    /// It gets it back, and its program is started.
+    /// The computer gets its power back, and its program is started.
     PowerOn,
 }
 
@@ -58,7 +58,7 @@ pub const fn name(host: Host) -> &'static str {
 }
 
 impl Step {
-    /// In a word, for the head of a table.
+    /// One word, for the head of a table.
     pub const fn word(self) -> &'static str {
         match self {
             Step::Calm => "calm",
@@ -72,7 +72,7 @@ impl Step {
         }
     }
 
-    /// In words; `active` is ACTIVE when it begins.
+    /// Text for people; `active` is ACTIVE when the incident begins.
     pub fn describe(self, active: Host, cable: &str) -> String {
         let (active, other) = (name(active), name(active.other()));
         match self {
@@ -102,14 +102,14 @@ impl Step {
         !matches!(self, Step::Kill | Step::HandOverAndCut | Step::PowerOff)
     }
 
-    /// Longest time between outputs in it at the most (docs/standby.md).
+    /// Longest permitted time between outputs (docs/standby.md).
     pub fn limit(self, times: &Times) -> Duration {
         let Times { cycle, time_out_cycles, several_frames } = *times;
         match self {
             // None is missing; the grid of cycles moves when the role does.
             Step::Calm | Step::HandOver => cycle + cycle * 3 / 5,
             // The time-out counts from the last process data, and a cycle of the other one begins after it. If a cycle
-            // has several frames, the first one counts as heard.
+            // has several frames, the first one restarts the time-out.
             Step::Kill | Step::PowerOff => cycle * (time_out_cycles + 1 + u32::from(several_frames)),
             // Two are missing at most where a cable is cut or a link comes up.
             Step::Restart | Step::HandOverAndCut | Step::Repair | Step::PowerOn => cycle * 3,

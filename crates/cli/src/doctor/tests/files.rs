@@ -170,7 +170,7 @@ const FAULTS: [Fault; 26] = [
 
 // covers: bench
 #[test]
-fn each_fault_in_a_file_is_found_with_what_mends_it() {
+fn each_fault_in_a_file_is_found_with_its_correction() {
     for (id, level, what, mend, files) in FAULTS {
         let findings = with(files);
         assert_finding(&findings, id, level, what, mend);
@@ -191,7 +191,7 @@ fn sleep_states_are_no_harm_where_programs_may_prevent_them() {
     specimen.write(&format!("{CPU}/cpu1/cpuidle/state2/disable"), b"0");
     specimen.write("dev/cpu_dma_latency", b"");
     assert_finding(&specimen.checks(), "c-states", Level::Good, "programs with --priority may prevent it", "");
-    fs::remove_dir_all(specimen.root.join(CPU).join("cpu0/cpuidle")).expect("it is ours");
-    fs::remove_dir_all(specimen.root.join(CPU).join("cpu1/cpuidle")).expect("it is ours");
+    fs::remove_dir_all(specimen.root.join(CPU).join("cpu0/cpuidle")).expect("it is writable");
+    fs::remove_dir_all(specimen.root.join(CPU).join("cpu1/cpuidle")).expect("it is writable");
     assert_finding(&specimen.checks(), "c-states", Level::Good, "the kernel uses none", "");
 }

@@ -19,8 +19,10 @@ const USES: [Case; 14] = [
     ("link", Level::Minor, "1000 Mbit/s", "other end", |it| {
         it.settings.link = Ok(Link { mbits: Some(1_000), full_duplex: Some(true) })
     }),
-    ("link", Level::Unknown, "does not tell", "", |it| it.settings.link = Ok(Link { mbits: None, full_duplex: None })),
-    ("link", Level::Unknown, "does not tell", "", |it| it.settings.link = Err(NoAnswer::NotSupported)),
+    ("link", Level::Unknown, "does not report", "", |it| {
+        it.settings.link = Ok(Link { mbits: None, full_duplex: None })
+    }),
+    ("link", Level::Unknown, "does not report", "", |it| it.settings.link = Err(NoAnswer::NotSupported)),
     ("address", Level::Bad, "192.0.2.2", "sudo ip address flush dev enp12s0f1np1abc", |it| {
         note(it, UseWarning::Address { interface: NAME.into(), address: [192, 0, 2, 2].into() })
     }),
@@ -51,7 +53,7 @@ const DEVICE: [Case; 9] = [
     ("driver", Level::Bad, "virtio_net", "pass-through", |it| {
         it.settings.driver = Ok(Driver { name: "virtio_net".into(), bus: String::new() })
     }),
-    ("driver", Level::Unknown, "does not tell", "", |it| it.settings.driver = Err(NoAnswer::NotSupported)),
+    ("driver", Level::Unknown, "does not report", "", |it| it.settings.driver = Err(NoAnswer::NotSupported)),
     ("coalescing", Level::Bad, "adapts", "adaptive-rx off", |it| {
         it.settings.coalescing = Ok(Coalescing { adaptive_rx: true, ..Coalescing::default() })
     }),
@@ -65,12 +67,12 @@ const DEVICE: [Case; 9] = [
         it.settings.offloads = Ok(Offloads { gro: true, lro: true })
     }),
     ("eee", Level::Bad, "active", "eee off", |it| it.settings.eee = Ok(Eee { enabled: true, active: true })),
-    ("eee", Level::Unknown, "does not tell", "", |it| it.settings.eee = Err(NoAnswer::NotSupported)),
+    ("eee", Level::Unknown, "does not report", "", |it| it.settings.eee = Err(NoAnswer::NotSupported)),
 ];
 
 // covers: bench
 #[test]
-fn what_the_kernel_and_the_driver_tell_of_an_interface_is_judged() {
+fn what_the_kernel_and_the_driver_report_of_an_interface_is_rated() {
     for (id, level, what, mend, change) in USES.into_iter().chain(DEVICE) {
         let mut specimen = Specimen::good();
         change(&mut specimen);

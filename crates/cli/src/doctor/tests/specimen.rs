@@ -26,7 +26,7 @@ pub struct Specimen {
 
 impl Drop for Specimen {
     fn drop(&mut self) {
-        fs::remove_dir_all(&self.root).expect("it is ours");
+        fs::remove_dir_all(&self.root).expect("it is writable");
     }
 }
 
@@ -135,8 +135,8 @@ impl Specimen {
 
     pub fn write(&self, path: &str, bytes: &[u8]) {
         let place = self.root.join(path);
-        fs::create_dir_all(place.parent().expect("it is below the root")).expect("it is ours");
-        fs::write(place, bytes).expect("it is ours");
+        fs::create_dir_all(place.parent().expect("it is below the root")).expect("it is writable");
+        fs::write(place, bytes).expect("it is writable");
     }
 
     pub fn checks(&self) -> Vec<Finding> {

@@ -14,7 +14,7 @@ const MAX_DATA: u16 = 1486;
 /// The commands in `InitCmds` of an element, except those that are disabled as mailbox commands can be.
 pub(super) fn list(parent: Element<'_>) -> Result<Vec<EcatCommand>, EniError> {
     let Some(commands) = parent.child("InitCmds") else { return Ok(Vec::new()) };
-    commands.knows(&["InitCmd"]);
+    commands.expects(&["InitCmd"]);
     let mut found = Vec::new();
     for element in commands.children("InitCmd") {
         if !element.flag_of("Disabled")? {
@@ -26,7 +26,7 @@ pub(super) fn list(parent: Element<'_>) -> Result<Vec<EcatCommand>, EniError> {
 
 /// One command.
 pub(super) fn command(element: Element<'_>) -> Result<EcatCommand, EniError> {
-    element.knows(&[
+    element.expects(&[
         "Transition",
         "BeforeSlave",
         "Comment",
@@ -88,7 +88,7 @@ pub(super) fn transitions(element: Element<'_>) -> Result<Vec<Transition>, EniEr
 }
 
 fn validate(element: Element<'_>) -> Result<Validate, EniError> {
-    element.knows(&["Data", "DataMask", "Timeout"]);
+    element.expects(&["Data", "DataMask", "Timeout"]);
     let data = element.required("Data")?.hex()?;
     let mask = element.hex_of("DataMask")?;
     if let Some(mask) = &mask

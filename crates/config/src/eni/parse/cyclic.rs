@@ -7,7 +7,7 @@ use crate::eni::model::{CopyInfo, CyclicCommand, CyclicState, CyclicTask, Frame}
 
 /// A task.
 pub(super) fn task(element: Element<'_>) -> Result<CyclicTask, EniError> {
-    element.knows(&["Comment", "CycleTime", "Priority", "TaskId", "Frame"]);
+    element.expects(&["Comment", "CycleTime", "Priority", "TaskId", "Frame"]);
     Ok(CyclicTask {
         place: element.place(),
         comment: element.text_of("Comment"),
@@ -17,12 +17,12 @@ pub(super) fn task(element: Element<'_>) -> Result<CyclicTask, EniError> {
 }
 
 fn frame(element: Element<'_>) -> Result<Frame, EniError> {
-    element.knows(&["Comment", "Cmd"]);
+    element.expects(&["Comment", "Cmd"]);
     Ok(Frame { commands: element.children("Cmd").map(command).collect::<Result<_, _>>()? })
 }
 
 fn command(element: Element<'_>) -> Result<CyclicCommand, EniError> {
-    element.knows(&[
+    element.expects(&[
         "State",
         "Comment",
         "Cmd",
@@ -63,7 +63,7 @@ fn state(element: Element<'_>) -> Result<CyclicState, EniError> {
 }
 
 fn copy(element: Element<'_>) -> Result<CopyInfo, EniError> {
-    element.knows(&["SrcBitOffs", "DstBitOffs", "BitSize"]);
+    element.expects(&["SrcBitOffs", "DstBitOffs", "BitSize"]);
     Ok(CopyInfo {
         place: element.place(),
         source: element.required_number("SrcBitOffs")?,

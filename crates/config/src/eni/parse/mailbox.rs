@@ -7,7 +7,7 @@ use crate::eni::model::{CoeCommand, EoeCommand, Mailbox, MailboxBuffer, Poll, Ra
 
 /// `Mailbox`.
 pub(super) fn mailbox(element: Element<'_>) -> Result<Mailbox, EniError> {
-    element.knows(&["Send", "Recv", "Receive", "BootStrap", "Protocol", "CoE", "SoE", "EoE", "AoE", "FoE", "VoE"]);
+    element.expects(&["Send", "Recv", "Receive", "BootStrap", "Protocol", "CoE", "SoE", "EoE", "AoE", "FoE", "VoE"]);
     let receive = receiving(element);
     let poll = match receive {
         None => None,
@@ -47,7 +47,7 @@ fn receiving(element: Element<'_>) -> Option<Element<'_>> {
 /// A buffer; `None` if it has no address or no length.
 fn buffer(element: Option<Element<'_>>) -> Result<Option<MailboxBuffer>, EniError> {
     let Some(element) = element else { return Ok(None) };
-    element.knows(&["Start", "Length", "ShortSend", "PollTime", "StatusBitAddr"]);
+    element.expects(&["Start", "Length", "ShortSend", "PollTime", "StatusBitAddr"]);
     let (start, length) = (element.number_of("Start")?, element.number_of("Length")?.filter(|length| *length != 0));
     Ok(start.zip(length).map(|(start, length)| MailboxBuffer { place: element.place(), start, length }))
 }
@@ -60,14 +60,14 @@ fn in_protocol<'a, T>(
 ) -> Result<Vec<T>, EniError> {
     let Some(protocol) = mailbox.child(protocol) else { return Ok(Vec::new()) };
     // A profile describes what the SubDevice is, and configures nothing.
-    protocol.knows(&["InitCmds", "NetId", "Profile"]);
+    protocol.expects(&["InitCmds", "NetId", "Profile"]);
     let Some(commands) = protocol.child("InitCmds") else { return Ok(Vec::new()) };
-    commands.knows(&["InitCmd"]);
+    commands.expects(&["InitCmd"]);
     commands.children("InitCmd").map(read).collect()
 }
 
 fn coe(element: Element<'_>) -> Result<CoeCommand, EniError> {
-    element.knows(&[
+    element.expects(&[
         "Transition",
         "Comment",
         "Timeout",
@@ -100,7 +100,7 @@ fn coe(element: Element<'_>) -> Result<CoeCommand, EniError> {
 }
 
 fn soe(element: Element<'_>) -> Result<SoeCommand, EniError> {
-    element.knows(&[
+    element.expects(&[
         "Transition",
         "Comment",
         "Timeout",
@@ -128,7 +128,7 @@ fn soe(element: Element<'_>) -> Result<SoeCommand, EniError> {
 }
 
 fn eoe(element: Element<'_>) -> Result<EoeCommand, EniError> {
-    element.knows(&[
+    element.expects(&[
         "Transition",
         "Comment",
         "Timeout",
@@ -160,7 +160,7 @@ fn eoe(element: Element<'_>) -> Result<EoeCommand, EniError> {
 }
 
 fn raw(element: Element<'_>, protocol: &'static str) -> Result<RawMailCommand, EniError> {
-    element.knows(&["Transition", "Comment", "Timeout", "Data", "Disabled"]);
+    element.expects(&["Transition", "Comment", "Timeout", "Data", "Disabled"]);
     Ok(RawMailCommand {
         place: element.place(),
         protocol,

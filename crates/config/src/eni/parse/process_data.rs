@@ -37,7 +37,7 @@ pub(super) fn process_data(element: Element<'_>) -> Result<ProcessData, EniError
 }
 
 fn range(element: Element<'_>) -> Result<BitRange, EniError> {
-    element.knows(&["BitStart", "BitLength"]);
+    element.expects(&["BitStart", "BitLength"]);
     let start: u32 = element.required_number("BitStart")?;
     let length: u32 = element.required_number("BitLength")?;
     if start.checked_add(length).is_none() {
@@ -48,7 +48,7 @@ fn range(element: Element<'_>) -> Result<BitRange, EniError> {
 }
 
 fn sync_manager(element: Element<'_>, index: u8) -> Result<SyncManagerSettings, EniError> {
-    element.knows(&[
+    element.expects(&[
         "Type",
         "MinSize",
         "MaxSize",
@@ -87,7 +87,7 @@ fn sync_manager(element: Element<'_>, index: u8) -> Result<SyncManagerSettings, 
 }
 
 fn pdo(element: Element<'_>, outputs: bool) -> Result<Pdo, EniError> {
-    element.knows(&["Index", "Name", "Exclude", "Entry", "ExcludedSm"]);
+    element.expects(&["Index", "Name", "Exclude", "Entry", "ExcludedSm"]);
     let sync_manager = match element.attribute("Sm").map(str::trim) {
         None | Some("") => None,
         Some(text) => match text.parse().ok().filter(|index| *index < SYNC_MANAGERS) {
@@ -109,7 +109,7 @@ fn pdo(element: Element<'_>, outputs: bool) -> Result<Pdo, EniError> {
 }
 
 fn entry(element: Element<'_>) -> Result<PdoEntry, EniError> {
-    element.knows(&["Index", "SubIndex", "BitLen", "Name", "Comment", "DataType"]);
+    element.expects(&["Index", "SubIndex", "BitLen", "Name", "Comment", "DataType"]);
     Ok(PdoEntry {
         index: element.number_of("Index")?.unwrap_or_default(),
         sub_index: element.number_of("SubIndex")?.unwrap_or_default(),
@@ -121,13 +121,13 @@ fn entry(element: Element<'_>) -> Result<PdoEntry, EniError> {
 
 /// `ProcessImage`.
 pub(super) fn image(element: Element<'_>) -> Result<ProcessImage, EniError> {
-    element.knows(&["Inputs", "Outputs"]);
+    element.expects(&["Inputs", "Outputs"]);
     let side = |name| element.child(name).map(image_side).transpose().map(Option::unwrap_or_default);
     Ok(ProcessImage { inputs: side("Inputs")?, outputs: side("Outputs")? })
 }
 
 fn image_side(element: Element<'_>) -> Result<ImageSide, EniError> {
-    element.knows(&["ByteSize", "Variable"]);
+    element.expects(&["ByteSize", "Variable"]);
     let bytes: Option<u32> = element.number_of("ByteSize")?;
     if let Some(size) = element.child("ByteSize")
         && bytes.is_some_and(|bytes| bytes > u32::MAX / 8)
@@ -139,7 +139,7 @@ fn image_side(element: Element<'_>) -> Result<ImageSide, EniError> {
 
 /// A variable may lie beyond the end of the image, as TwinCAT's state information of devices does.
 fn variable(element: Element<'_>) -> Result<Variable, EniError> {
-    element.knows(&["Name", "Comment", "DataType", "BitSize", "BitOffs"]);
+    element.expects(&["Name", "Comment", "DataType", "BitSize", "BitOffs"]);
     let bits: u32 = element.required_number("BitSize")?;
     let bit_offset: u32 = element.required_number("BitOffs")?;
     if bit_offset.checked_add(bits).is_none() {

@@ -39,7 +39,7 @@ pub fn skeleton(image: &[u8]) -> Result<Skeleton, SiiError> {
     let mut out = Xml { text: String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"), depth: 0 };
     // Writing to a string cannot fail.
     let _ = document(&mut out, &sii, image);
-    Ok(Skeleton { text: out.text, notices: unsaid(&sii) })
+    Ok(Skeleton { text: out.text, notices: not_expressible(&sii) })
 }
 
 /// Elements with their indentation.
@@ -260,7 +260,7 @@ fn has_mailbox(sii: &Sii<'_>) -> bool {
 }
 
 /// What a description cannot express: it has only the mailboxes of its SyncManagers, and protocols with an element.
-fn unsaid(sii: &Sii<'_>) -> Vec<String> {
+fn not_expressible(sii: &Sii<'_>) -> Vec<String> {
     if !has_mailbox(sii) {
         return Vec::new();
     }

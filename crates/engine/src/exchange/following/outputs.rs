@@ -2,7 +2,7 @@
 //! FR-05).
 //!
 //! Two states of them: the latest ones, datagram by datagram, which a takeover goes on with, so that no output goes
-//! back to an older value; and those of a cycle that was received as a whole, which the application sees.
+//! back to an older value; and those of a cycle that was received as a whole, which the application gets.
 
 use alloc::boxed::Box;
 use alloc::vec;

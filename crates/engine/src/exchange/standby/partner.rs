@@ -1,4 +1,5 @@
-//! What the ACTIVE knows of the other MainDevice, from what comes back in its master frames (protocol FR-11).
+//! State of the other MainDevice, as determined by the ACTIVE, from what comes back in its master frames (protocol
+//! FR-11).
 
 use alloc::sync::Arc;
 
@@ -140,7 +141,7 @@ mod tests {
 
     // covers: FR-11, 9.16, standby
     #[test]
-    fn absent_forwarding_and_alive_are_told_apart_and_single_losses_are_not_reported() {
+    fn absent_forwarding_and_alive_differ_and_single_losses_are_not_reported() {
         let mut watch = PartnerWatch::default();
         let nothing = Returned::default();
         let forwarded = Returned { is_forwarded: true, ..nothing };

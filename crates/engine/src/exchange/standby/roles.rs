@@ -178,7 +178,7 @@ impl State {
         match self.following.whole() {
             _ if self.goes_through_init => Takeover::ThroughInit,
             Some(whole) if is_same(&whole.header) => Takeover::FromOther,
-            // A frame that came at the time of the change counts as heard: it may be that of another ACTIVE.
+            // A frame that arrived at the time of the change counts: it may be a frame of another ACTIVE.
             None if self.left_at.is_some_and(|left| heard_at.is_none_or(|at| at < left)) => Takeover::FromItself,
             _ => Takeover::ThroughInit,
         }

@@ -166,7 +166,7 @@ fn states_and_diagnosis_of_the_active_are_those_of_the_inactive() {
 
 // covers: FR-11, MR-07, standby
 #[test]
-fn the_active_tells_a_bare_forwarder_from_one_that_follows_and_notices_both_ends() {
+fn the_active_distinguishes_a_bare_forwarder_and_detects_both_ends() {
     let mut duo = Duo::new(MasterSizes::default());
     duo.is_bare = true;
     (0..5).for_each(|_| duo.cycle());

@@ -93,7 +93,7 @@ pub(super) fn lane(protocol: Protocol, payload: &[u8]) -> Result<Lane, u16> {
             Ok(Lane::Eoe)
         }
         Protocol::Eoe => Err(ErrorReply::SERVICE_NOT_SUPPORTED),
-        // The SubDevice knows whether it supports a type that RingCAT does not know.
+        // The SubDevice decides whether it supports a type unknown to RingCAT.
         Protocol::Other(code) => Ok(Lane::Other(code)),
         // Error replies are never answered: two ends could answer each other endlessly.
         Protocol::Error => Err(ErrorReply::UNSUPPORTED_PROTOCOL),

@@ -20,21 +20,21 @@ const ROOM: usize = 4;
 pub(super) struct Requested<W> {
     /// The mailbox, if the SubDevice supports CoE.
     mailbox: Option<Mailbox>,
-    wants: W,
+    is_requested: W,
 }
 
 impl<W: Fn(u8) -> bool> Requested<W> {
-    /// `wants` returns whether a subindex is requested; others are not read.
-    pub fn of(segment: &SharedSegment, index: usize, wants: W) -> Requested<W> {
+    /// `is_requested` returns whether a subindex is requested; others are not read.
+    pub fn of(segment: &SharedSegment, index: usize, is_requested: W) -> Requested<W> {
         let view = segment.view();
         let info = view.member(index).and_then(|member| member.info);
-        let speaks = info.is_some_and(|info| info.protocols.0 & MailboxProtocols::COE != 0);
-        Requested { mailbox: segment.mailbox(index).filter(|_| speaks).filter(Mailbox::is_open), wants }
+        let has_coe = info.is_some_and(|info| info.protocols.0 & MailboxProtocols::COE != 0);
+        Requested { mailbox: segment.mailbox(index).filter(|_| has_coe).filter(Mailbox::is_open), is_requested }
     }
 
     /// The value read; `None` also without an answer.
     async fn value(&self, sub_index: u8, object: SdoAddress) -> Option<u32> {
-        let mailbox = self.mailbox.as_ref().filter(|_| (self.wants)(sub_index))?;
+        let mailbox = self.mailbox.as_ref().filter(|_| (self.is_requested)(sub_index))?;
         let before = mailbox.last_protocol_error();
         let answer = read(mailbox, object, LIMITS, ROOM).await;
         if answer.as_ref().is_err_and(|error| matches!(error.cause, SdoFailure::Aborted(_))) {

@@ -32,7 +32,7 @@ pub struct EepromOwnership {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum EepromAssignment {
-    /// Offered to the PDI, which takes it when it wants to.
+    /// Offered to the PDI, which takes it when it needs it.
     ToPdi,
     /// Back to EtherCAT, as soon as the PDI has given it back.
     ToEthercat,

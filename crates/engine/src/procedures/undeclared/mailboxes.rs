@@ -76,7 +76,7 @@ impl UndeclaredMailboxes {
         self.all.borrow().iter().find(|entry| entry.key == key).map(|entry| entry.mailbox.clone())
     }
 
-    /// What another process must know of the mailbox of a SubDevice.
+    /// What another process needs of the mailbox of a SubDevice.
     pub(crate) fn known(&self, key: SubDeviceKey) -> Option<KnownMailbox> {
         self.of(key)?.known()
     }

@@ -25,7 +25,7 @@ pub enum ClockObservation<'a> {
 
     /// The application has chosen the reference.
     ReferenceChosen(ReferenceClock),
-    /// What another process knows of the clocks.
+    /// Knowledge of another process about the clocks.
     Known(Rc<KnownClocks>),
     /// The set-up of all clocks begins.
     SetUpBegun,
@@ -165,7 +165,7 @@ pub enum ClockFinding<'a> {
 #[cfg(feature = "standby")]
 #[derive(Clone, Copy, Debug)]
 pub struct AdoptedClocks<'a> {
-    /// What that MainDevice knows of them.
+    /// Knowledge of that MainDevice about them.
     pub known: &'a KnownClocks,
     /// Their registers, as far as they answer.
     pub clocks: &'a [AdoptedClock],

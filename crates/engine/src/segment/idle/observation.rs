@@ -39,8 +39,8 @@ pub enum IdleObservation<'a> {
     StatesRead(&'a [StateRead]),
     /// The states of some of them were read, beside a broadcast.
     SomeRead(&'a [StateRead]),
-    /// The scan under way reads EEPROMs from now on; addresses of which it knows that no SubDevice, or several, have
-    /// them.
+    /// The scan under way reads EEPROMs from now on; addresses for which it has found that no SubDevice, or several,
+    /// have them.
     ReadingBegun(&'a [StationAddress]),
     /// It no longer does.
     ReadingEnded,

@@ -1,8 +1,8 @@
 //! Crossed lines in operation (protocol 9.5): after each change of ports the segment is scanned again, and each
 //! SubDevice that frames enter at another port than 0 is reported once.
 //!
-//! Unknown rings behind junctions are reported too: an application with junction redundancy must know that one of them
-//! is not monitored.
+//! Unknown rings behind junctions are reported too: an application with junction redundancy needs the information that
+//! one of them is not monitored.
 
 use alloc::vec::Vec;
 

@@ -8,7 +8,7 @@ use ringcat_link::operator::Priority;
 
 use crate::daemon::ownership::Ownership;
 
-/// Samples without an answer until the SubDevices count as absent: a scan knows them before supervision does.
+/// Samples without an answer until the SubDevices count as absent: a scan finds them before supervision does.
 const SILENT_LOOKS: u32 = 3;
 /// Names of the AL states by bit.
 const STATES: [&str; 4] = ["INIT", "PREOP", "SAFEOP", "OP"];
@@ -92,8 +92,8 @@ impl Lines {
         }
         let (priority, text) = match now {
             Ownership::TakenBack => {
-                let told = format!("The master was taken back by ringcatd: {cause}.");
-                (Priority::Error, told + " Calls of this process have no effect until it is requested again.")
+                let text = format!("The master was taken back by ringcatd: {cause}.");
+                (Priority::Error, text + " Calls of this process have no effect until it is requested again.")
             }
             Ownership::DaemonEnded => {
                 (Priority::Warning, "ringcatd has ended; this process continues to drive the master.".to_owned())

@@ -35,7 +35,7 @@ fn of_engine(engine: &mut Engine) -> MasterReport {
     let links = links
         .filter_map(|(mac, link)| Some(LinkReport { mac: mac?.0, carrier: link.carrier, traffic: Traffic::default() }));
     MasterReport {
-        // It has links here; a daemon knows whether their devices are there.
+        // It has links here; a daemon checks whether their devices are present.
         is_orphaned: false,
         is_active: phase == MainDevicePhase::Operation,
         is_scanning: snapshot.activity == Activity::Scanning,

@@ -111,7 +111,7 @@ impl Links for HostLinks {
         !self.shared.lock().slot(self.host).arrived.is_empty()
     }
 
-    fn knows_arrivals(&self) -> bool {
+    fn has_arrival_times(&self) -> bool {
         true
     }
 

@@ -26,7 +26,7 @@ const LONGEST_ORDER: usize = 256;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Ending {
-    /// It has not begun: it cannot do what it is to do, and has told the program why.
+    /// It has not begun: it cannot do what it is to do, and has sent the program the reason.
     Refused,
     /// The program has released it: it has not acted.
     Released,
@@ -145,7 +145,7 @@ mod tests {
 
     // covers: standby, MR-21
     #[test]
-    fn a_guard_sees_the_end_of_the_stream_and_a_release_at_once() {
+    fn a_guard_detects_the_end_of_the_stream_and_a_release_at_once() {
         let (near, _heartbeat, watch) = guarded(LONG, None);
         drop(near);
         assert_eq!(watch.join().expect("no panic").0, Ending::Died);
@@ -157,7 +157,7 @@ mod tests {
 
     // covers: standby, MR-21
     #[test]
-    fn a_guard_sees_the_end_of_the_process_although_a_child_keeps_the_stream() {
+    fn a_guard_detects_the_end_of_the_process_although_a_child_keeps_the_stream() {
         let mut child = Command::new("sleep").arg("60").spawn().expect("sleep is there");
         let end = ringcat_link::process::watch(child.id()).expect("it lives");
         let (near, _heartbeat, watch) = guarded(LONG, Some(end));

@@ -199,7 +199,7 @@ fn undeclared_subdevices_reach_op_after_a_program_with_other_pdos() {
     }
 }
 
-/// A program that knows nothing of the device changes its PDOs by SDO; the next one finds them.
+/// A program that was not written for the device changes its PDOs by SDO; the next one finds them.
 // covers: states, mailbox
 #[test]
 fn pdos_that_are_changed_by_sdo_are_known_within_100_ms() {

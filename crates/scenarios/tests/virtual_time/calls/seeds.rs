@@ -148,7 +148,7 @@ impl Sequence {
     fn use_mailbox(&mut self) {
         let at = self.dice.below(self.described.len() as u64 + 1) as u16;
         match self.dice.below(6) {
-            // Another assignment, by a program that knows the device; a part of one, by a program that is killed.
+            // Another assignment, by a program written for the device; a part of one, by a program that is killed.
             4 => {
                 let other = [(0x1C12, 0, &[0][..]), (0x1C12, 1, &[1, 0x16]), (0x1C12, 0, &[1])];
                 let count = 1 + self.dice.below(3) as usize;

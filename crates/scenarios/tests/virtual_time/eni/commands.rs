@@ -43,7 +43,7 @@ fn register(names: &[&str], code: u8, data: &str) -> String {
     )
 }
 
-/// A download to the mode of operation, the value of which tells the commands apart.
+/// A download to the mode of operation, the value of which distinguishes the commands.
 fn object(names: &[&str], value: u8) -> String {
     let at = transitions(names);
     format!("<InitCmd>{at}<Comment>mode</Comment><Ccs>1</Ccs><Index>24672</Index><Data>{value:02x}</Data></InitCmd>")

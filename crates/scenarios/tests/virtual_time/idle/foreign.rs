@@ -31,7 +31,7 @@ fn idle(network: Network) -> MainDevice<Tap> {
     main_device
 }
 
-/// What the MainDevice knows is what is there: each address names the SubDevice that has it, with its identity.
+/// The list of the MainDevice agrees with the bus: each address names the SubDevice that has it, with its identity.
 fn assert_known(main_device: &mut MainDevice<Tap>, what: &str) {
     let found = main_device.subdevices();
     let network = main_device.links_mut().network();

@@ -1,4 +1,4 @@
-//! Rings behind junctions that a scan learns: in mode automatic several rings, nested, one of them broken, although
+//! Rings behind junctions that a scan detects: in mode automatic several rings, nested, one of them broken, although
 //! open ports allow many solutions (JR-03); of a broken ring all but one end of the broken cable.
 
 use ringcat::Position;

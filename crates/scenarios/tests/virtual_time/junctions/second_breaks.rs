@@ -356,7 +356,7 @@ fn breaks_of_two_rings_during_a_controlled_break_are_located_too() {
         world.run_cycles(cycles);
         world.cut(CableId(2));
         world.cut(CableId(6));
-        // The first one was reported as broken before, and not yet as mended.
+        // The first one was reported as broken before, and not yet as repaired.
         let is_located = |world: &World| reports(world, mark).contains(&place(6, 2));
         let begin = world.now();
         for _ in 0..400 {

@@ -1,4 +1,4 @@
-//! Mode automatic learns rings behind junctions of any length, and reports those that it does not learn (JR-03).
+//! Mode automatic detects rings behind junctions of any length, and reports those that it does not detect (JR-03).
 
 use std::time::Duration;
 

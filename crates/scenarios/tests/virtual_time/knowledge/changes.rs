@@ -56,7 +56,7 @@ fn a_subdevice_that_was_sent_to_init_is_reported_and_brought_back() {
         for network in networks() {
             let mut former = idle(network);
             let bytes = to_bytes(&former);
-            // Another MainDevice, which this one does not know of.
+            // Another MainDevice, unknown to this one.
             let init = AlControl::new(AlState::Init).bits();
             former.subdevice(Position(3)).register_write::<u16>(map::AL_CONTROL, init).expect("it is written");
             let mut links = former.into_links();

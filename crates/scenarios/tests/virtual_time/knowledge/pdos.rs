@@ -38,7 +38,7 @@ fn with_others(main_device: MainDevice<Tap>) -> Application<Tap> {
 /// from before the application or from its time.
 // covers: states, plan
 #[test]
-fn any_owner_knows_the_pdos_of_the_one_before_and_reaches_op_with_its_own() {
+fn any_owner_gets_the_pdos_of_the_one_before_and_reaches_op_with_its_own() {
     for (is_active, handover, are_bytes_old) in [
         (true, Handover::Orderly, false),
         (false, Handover::Orderly, false),
@@ -91,7 +91,7 @@ fn any_owner_knows_the_pdos_of_the_one_before_and_reaches_op_with_its_own() {
     }
 }
 
-/// Dictionaries of 100 SubDevices are known from the bytes: no mail asks for them.
+/// Dictionaries of 100 SubDevices are known from the bytes: no mail requests them.
 // covers: states
 #[test]
 fn known_dictionaries_are_not_read_again_by_the_next_owner() {

@@ -1,5 +1,5 @@
-//! Random faults of a ring of two, one after the other, each mended before the next one: the INACTIVE is killed, hangs,
-//! loses its power, cables are cut, frames are lost.
+//! Random faults of a ring of two, one after the other, each repaired before the next one: the INACTIVE is killed,
+//! hangs, loses its power, cables are cut, frames are lost.
 
 use std::ops::Range;
 use std::time::Duration;

@@ -145,9 +145,9 @@ fn text_that_is_no_toml_is_refused_with_its_line_and_without_rust_types() {
     }
 }
 
-/// The reader refuses an unknown key with the keys that it knows: they are those of the tables here.
+/// The reader refuses an unknown key with its own keys: they are those of the tables here.
 #[test]
-fn the_keys_are_those_that_the_reader_knows() {
+fn the_keys_are_those_of_the_reader() {
     for (before, keys) in [("[segment]", SEGMENT), ("[[device]]", DEVICE), ("[[cable]]", CABLE)] {
         let message = crate::segment::format::File::parse(&format!("{before}\nno_such_key = 1")).unwrap_err().message;
         let known: Vec<&str> = message.split('`').skip(3).step_by(2).collect();

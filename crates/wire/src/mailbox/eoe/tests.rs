@@ -109,10 +109,10 @@ fn requests_and_results_have_the_expected_bytes() {
         assert_eq!(encoded(body), bytes);
         assert_eq!(decoded(bytes).body, body);
     }
-    let told = EoeBody::Ip(EoeResult::OK, IpParameters { mac: Some([1; 6]), ..IpParameters::default() });
-    let bytes = encoded(told);
+    let body = EoeBody::Ip(EoeResult::OK, IpParameters { mac: Some([1; 6]), ..IpParameters::default() });
+    let bytes = encoded(body);
     assert_eq!((&bytes[..5], bytes.len()), (&[0x07, 0x01, 0, 0, 1][..], 62));
-    assert_eq!(decoded(&bytes).body, told);
+    assert_eq!(decoded(&bytes).body, body);
     let refused = EoeBody::Filter(EoeResult::NO_FILTER_SUPPORT, AddressFilter::default());
     assert_eq!(decoded(&[0x09, 0x01, 0x01, 0x04]).body, refused);
     assert_eq!(decoded(&encoded(refused)).body, refused);

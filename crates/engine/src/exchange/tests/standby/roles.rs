@@ -96,7 +96,7 @@ fn outputs_of_a_cycle_that_was_cut_off_never_go_back_to_those_before() {
     duo.drop_frame(ringcat_wire::master_frame::is_master_frame);
     duo.cycle();
     duo.second.exchange.begin_role(duo.now);
-    assert_eq!(duo.second.exchange.image(DOMAIN)[..3], [1; 3], "the application sees whole cycles");
+    assert_eq!(duo.second.exchange.image(DOMAIN)[..3], [1; 3], "the application gets whole cycles");
     duo.second.control.request(RoleRequest::Active);
     duo.second.exchange.begin_role(duo.now);
     assert_eq!(duo.second.exchange.image(DOMAIN)[..3], [2; 3], "the SubDevices have these");

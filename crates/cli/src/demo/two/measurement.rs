@@ -1,4 +1,4 @@
-//! What the SubDevices have noticed, read inside the simulated devices and on the interfaces of both controllers.
+//! Effects of the incidents, measured inside the simulated devices and on the interfaces of both controllers.
 //!
 //! In: the segment, after each cycle or less. Out: per SubDevice the longest time between outputs in each incident,
 //! changes of its state, watchdogs that expired; outputs that were older than those before; how long both controllers
@@ -60,7 +60,7 @@ struct Newest {
 
 /// Watches all SubDevices and both controllers.
 #[derive(Debug)]
-pub struct Judge {
+pub struct Measurement {
     cycle: Duration,
     identities: [[u8; 3]; 2],
     /// The SubDevices.
@@ -77,20 +77,20 @@ pub struct Judge {
     pub outdated: u64,
     /// How often a drive was not enabled that had been enabled before.
     pub disabled: u64,
-    /// The first faults in words.
+    /// Texts of the first faults.
     pub described: Vec<String>,
 }
 
-impl Judge {
-    /// From now on, with these areas of process data.
-    pub fn new(network: &mut Network, places: &[Place], cycle: Duration, identities: [[u8; 3]; 2]) -> Judge {
+impl Measurement {
+    /// Begins now, with these areas of process data.
+    pub fn new(network: &mut Network, places: &[Place], cycle: Duration, identities: [[u8; 3]; 2]) -> Measurement {
         // What was logged before belongs to no incident.
         drop(network.take_host_log());
         let watched = places.iter().enumerate().map(|(position, place)| {
             let device = device_at(network, position);
             Watched::new(network.device(device), device, place.clone())
         });
-        Judge {
+        Measurement {
             cycle,
             identities,
             watched: watched.collect(),
@@ -115,7 +115,7 @@ impl Judge {
         self.watched.iter_mut().filter(|watched| watched.is_drive()).for_each(|drive| drive.targets.push(0));
     }
 
-    /// Looks at all that has happened since the last call, and gives the SubDevices new inputs.
+    /// Evaluates everything since the last call, and gives the SubDevices new inputs.
     pub fn look(&mut self, network: &mut Network) {
         for frame in network.take_host_log() {
             self.frame(&frame);
@@ -196,7 +196,7 @@ impl Judge {
         }
     }
 
-    /// A frame on an interface of a controller: one that it sends itself says that it is ACTIVE.
+    /// Processes a frame on an interface of a controller. A controller that sends frames of its own is ACTIVE.
     fn frame(&mut self, frame: &HostFrame) {
         let host = frame.link.host();
         if !frame.is_sent || frame.head[9..12] != self.identities[host as usize] {
@@ -324,7 +324,11 @@ mod tests {
         assert!(Newest::default().cycle_fault(&[0x00, 0x00], 0x5000).is_some(), "zeros are an old cycle");
         let mut drive = Newest::default();
         let mut take = |target: i32| drive.target_fault(&[&[0x0F, 0][..], &target.to_le_bytes()].concat(), 2);
-        assert_eq!((take(i32::MAX - 1), take(i32::MAX), take(i32::MIN)), (None, None, None), "it turns for ever");
+        assert_eq!(
+            (take(i32::MAX - 1), take(i32::MAX), take(i32::MIN)),
+            (None, None, None),
+            "the position wraps around"
+        );
         assert!(take(i32::MAX).is_some_and(|fault| fault.starts_with("go back from target")));
     }
 
@@ -342,15 +346,15 @@ mod tests {
 
     // covers: demo, standby, MR-10
     #[test]
-    fn both_controllers_are_together_from_the_second_ones_first_frame_on() {
+    fn both_controllers_send_from_the_first_frame_of_the_second_one_on() {
         let identities = [[0, 0x53, 0x01], [0, 0x53, 0x11]];
         let mut network = Network::new(Vec::new(), Vec::new(), Default::default()).expect("it is empty");
-        let mut judge = Judge::new(&mut network, &[], Duration::from_millis(1), identities);
+        let mut measurement = Measurement::new(&mut network, &[], Duration::from_millis(1), identities);
         let mut send = |us: u64, host: Host, is_sent: bool| {
             let mut head = [0; 26];
             head[9..12].copy_from_slice(&identities[host as usize]);
-            judge.frame(&HostFrame { at: SimTime::from_micros(us), link: host.main(), is_sent, head });
-            judge.together
+            measurement.frame(&HostFrame { at: SimTime::from_micros(us), link: host.main(), is_sent, head });
+            measurement.together
         };
         assert_eq!(send(0, Host::First, true), Duration::ZERO);
         assert_eq!(send(100, Host::Second, false), Duration::ZERO, "it was received");
