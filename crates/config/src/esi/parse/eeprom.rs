@@ -28,7 +28,7 @@ pub(super) fn eeprom(element: Element<'_>) -> Result<Eeprom, EsiError> {
 }
 
 fn category(element: Element<'_>) -> Result<EepromCategory, EsiError> {
-    let number = element.required_number("CatNo")?;
+    let number: u16 = element.required_number("CatNo")?;
     if number == CATEGORY_END {
         let expected = format!("a category: {CATEGORY_END} is the end of an EEPROM");
         return Err(element.required("CatNo")?.error(EsiProblem::Value { expected, got: number.to_string() }));
