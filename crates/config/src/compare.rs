@@ -14,6 +14,9 @@ mod marks;
 mod moves;
 mod order;
 mod process_data;
+mod properties;
+mod replugged;
+mod unlisted;
 
 use std::collections::BTreeSet;
 
@@ -25,7 +28,9 @@ use ringcat_wire::address::Position;
 use crate::configuration::Configuration;
 use align::Place;
 
-pub use difference::{Difference, DifferenceKind, FoundNetwork, Stated};
+pub use difference::{Difference, DifferenceKind, FoundNetwork, Stated, StatedSyncManager};
+pub(crate) use properties::ports;
+pub use unlisted::DeclaredPdos;
 
 impl Configuration {
     /// Names of the SubDevices for messages: name and station address of the file.
@@ -83,7 +88,7 @@ impl Configuration {
     }
 
     /// Every difference between the network of a scan and the file: SubDevices that are missing, additional or at
-    /// another place, revision, serial number, PDOs, mailboxes, cables. `stated` are the [`Stated`] properties by the
+    /// another place, revision, serial number, PDOs, mailboxes, SyncManagers, ports, cables. `stated` are the [`Stated`] properties by the
     /// index of the SubDevice; it may be empty.
     pub fn differences(&self, network: FoundNetwork<'_>, stated: &[Stated]) -> Vec<Difference> {
         let FoundNetwork { subdevices: found, topology, firmware } = network;
@@ -102,7 +107,8 @@ impl Configuration {
                             position: Some(found[info].position),
                             kind: DifferenceKind::Order,
                             prevents_op: marks.fails(config)
-                                || order.other(config).is_some_and(|other| marks.fails(other)),
+                                || order.other(config).is_some_and(|other| marks.fails(other))
+                                || order.shifted_with(config).any(|other| marks.fails(other)),
                             text,
                         });
                     }
@@ -129,15 +135,6 @@ impl Configuration {
             differences.extend(cables::compare(self, &pairs, found, topology));
         }
         differences
-    }
-
-    /// Whether the file assigns PDOs to a SubDevice of this vendor and product that its SII does not list: it may have
-    /// modules in slots ([`Stated::modular`]).
-    pub fn has_unlisted_pdos(&self, found: &SubDeviceInfo, stated: &[Stated]) -> bool {
-        let declared = self.declaration.subdevices.iter().enumerate();
-        declared
-            .filter(|(config, declared)| alike::is_device(declared, stated.get(*config), found))
-            .any(|(_, declared)| process_data::pdos(declared).any(|(_, pdo)| found.pdo(pdo.index).is_none()))
     }
 
     fn missing(&self, config: usize, names: &[String], prevents_op: bool) -> Difference {

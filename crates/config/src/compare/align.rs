@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use ringcat_engine::config::{ConfigAddress, SubDeviceConfig};
 use ringcat_engine::info::SubDeviceInfo;
 
-use super::alike::{Alike, DeviceKey, OWN, device};
+use super::alike::{Alike, DeviceKey, OWN, device, keys_of};
 use super::difference::Stated;
 use super::moves::moves;
 use crate::configuration::Configuration;
@@ -101,14 +101,21 @@ fn name_moves(configs: &[SubDeviceConfig], info_of: &[Option<usize>], moved: &mu
 }
 
 /// Where each SubDevice has its counterpart in the order of positions, each has to be at its position: the file may
-/// have gaps between them.
+/// have gaps between them, and SubDevices that are declared by alias may have moved between them.
 fn exact_positions(configs: &[SubDeviceConfig], info_of: &[Option<usize>], moved: &mut [bool]) {
-    let is_plain = |config: &SubDeviceConfig| by_position(config) && config.group.is_none();
-    if !configs.iter().all(is_plain) || info_of.contains(&None) {
+    if configs.iter().any(|config| config.group.is_some()) || info_of.contains(&None) {
         return;
     }
-    for (config, info) in info_of.iter().enumerate() {
-        moved[config] |= *info != Some(position(&configs[config]));
+    let placed = (0..configs.len()).filter(|config| by_position(&configs[*config]));
+    let mut placed: Vec<(usize, usize, usize)> =
+        placed.filter_map(|config| Some((position(&configs[config]), info_of[config]?, config))).collect();
+    placed.sort_unstable();
+    // Of neighbours that are shifted by as much, the first one stands for all.
+    let mut before = 0;
+    for (position, info, config) in placed {
+        let shift = info as isize - position as isize;
+        moved[config] |= shift != 0 && shift != before;
+        before = shift;
     }
 }
 
@@ -173,8 +180,7 @@ impl ByDevice {
     fn new(found: &[SubDeviceInfo]) -> ByDevice {
         let mut places: BTreeMap<DeviceKey, Vec<usize>> = BTreeMap::new();
         for (at, info) in found.iter().enumerate().rev() {
-            let (vendor, product) = (Some(info.identity.vendor_id), Some(info.identity.product_code));
-            for key in [(vendor, product), (vendor, None), (None, product), (None, None)] {
+            for key in keys_of(info) {
                 places.entry(key).or_default().push(at);
             }
         }

@@ -66,10 +66,8 @@ impl<'a> Alike<'a> {
 }
 
 fn unit(declared: &SubDeviceConfig, stated: Option<&Stated>) -> Option<Unit> {
-    let stated = stated.and_then(|stated| stated.device);
-    let vendor = declared.expected.vendor_id.or(stated.map(|device| device.0))?;
-    let product = declared.expected.product_code.or(stated.map(|device| device.1))?;
-    Some((vendor, product, declared.expected.serial?))
+    let (vendor, product) = device(declared, stated);
+    Some((vendor?, product?, declared.expected.serial?))
 }
 
 const fn unit_of(info: &SubDeviceInfo) -> Unit {
@@ -84,6 +82,12 @@ pub(super) fn device(config: &SubDeviceConfig, stated: Option<&Stated>) -> Devic
     let stated = stated.and_then(|stated| stated.device);
     let vendor = config.expected.vendor_id.or(stated.map(|device| device.0));
     (vendor, config.expected.product_code.or(stated.map(|device| device.1)))
+}
+
+/// What a declaration can say of the device of a found SubDevice.
+pub(super) const fn keys_of(found: &SubDeviceInfo) -> [DeviceKey; 4] {
+    let (vendor, product) = (Some(found.identity.vendor_id), Some(found.identity.product_code));
+    [(vendor, product), (vendor, None), (None, product), (None, None)]
 }
 
 /// Whether a found SubDevice has the vendor and the product of a declared one.
