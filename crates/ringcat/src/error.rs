@@ -50,6 +50,9 @@ pub enum Error {
     /// One of two MainDevices needs a redundant link.
     #[cfg(feature = "standby")]
     NeedsTwoLinks(crate::standby::NeedsTwoLinks),
+    /// The other MainDevice has the same identity.
+    #[cfg(feature = "standby")]
+    SameIdentity(crate::standby::SameIdentity),
     /// A service did not end in time.
     TimedOut {
         /// The limit.
@@ -93,6 +96,8 @@ impl fmt::Display for Error {
             Error::NoDomain(error) => error.fmt(f),
             #[cfg(feature = "standby")]
             Error::NeedsTwoLinks(error) => error.fmt(f),
+            #[cfg(feature = "standby")]
+            Error::SameIdentity(error) => error.fmt(f),
             Error::TimedOut { limit } => write!(f, "not done within {} ms", limit.as_millis()),
             Error::Stop(error @ StopError::Bus(BusError::Lost { .. })) => write!(
                 f,
@@ -131,6 +136,8 @@ impl std::error::Error for Error {
             Error::Segment(error) => Some(error),
             #[cfg(feature = "standby")]
             Error::NeedsTwoLinks(error) => Some(error),
+            #[cfg(feature = "standby")]
+            Error::SameIdentity(error) => Some(error),
             Error::Thread(error) => Some(error),
             #[cfg(feature = "gateway")]
             Error::Gateway { cause, .. } => Some(cause),
@@ -162,6 +169,13 @@ errors! {
     Write(WriteError),
     NoDomain(NoDomain),
     Stop(StopError),
+}
+
+#[cfg(feature = "standby")]
+impl From<crate::standby::SameIdentity> for Error {
+    fn from(error: crate::standby::SameIdentity) -> Error {
+        Error::SameIdentity(error)
+    }
 }
 
 #[cfg(feature = "standby")]

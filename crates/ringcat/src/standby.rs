@@ -111,6 +111,30 @@ impl fmt::Display for NeedsTwoLinks {
 
 impl Error for NeedsTwoLinks {}
 
+impl ForwardingCounters {
+    /// The error of a MainDevice that has received frames with its own identity from another one.
+    pub const fn check_identity(&self) -> Result<(), SameIdentity> {
+        if self.same_identity == 0 { Ok(()) } else { Err(SameIdentity) }
+    }
+}
+
+/// The ACTIVE has the identity of this MainDevice: neither can distinguish its frames from those of the other one
+/// (protocol SM-09, REQ006).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct SameIdentity;
+
+impl fmt::Display for SameIdentity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(
+            "the ACTIVE has the same bytes 3 to 5 in its address as an interface here, so neither can distinguish its \
+             frames from those of the other: give that interface another address (ip link set IF address ...)",
+        )
+    }
+}
+
+impl Error for SameIdentity {}
+
 impl StoreAndForward {
     /// With the addresses of the own interfaces, of a MainDevice that has sent nothing. Frames older than [`MAX_AGE`]
     /// are not forwarded.

@@ -4,9 +4,7 @@ use ringcat::standby::ForwardingCounters;
 
 /// Why this MainDevice and the ACTIVE cannot share a ring.
 pub fn same_identity(counters: &ForwardingCounters) -> Option<String> {
-    let reason = "the ACTIVE has the same bytes 3 to 5 in its address as an interface here, so neither can distinguish \
-                  its frames from those of the other: give that interface another address (ip link set IF address ...)";
-    (counters.same_identity > 0).then(|| reason.to_owned())
+    counters.check_identity().err().map(|error| error.to_string())
 }
 
 /// The counters in a line.

@@ -58,6 +58,7 @@ impl Exchange {
             exchanges_from,
             yields_without_links: setup.yields_without_links,
             goes_through_init: setup.goes_through_init,
+            is_forced: false,
             offered: 0,
             shown: None,
             foreign_in: 0,

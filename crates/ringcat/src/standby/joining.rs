@@ -171,7 +171,8 @@ impl<L: Links> MainDevice<L> {
     /// ```
     ///
     /// # Errors
-    /// There is no redundant link; as [`MainDevice::follow`] and [`MainDevice::bring_up`].
+    /// There is no redundant link; the ACTIVE has the identity of this MainDevice ([`SameIdentity`](super::SameIdentity)); as
+    /// [`MainDevice::follow`] and [`MainDevice::bring_up`].
     pub fn join(
         mut self,
         policy: &Policy,
@@ -181,6 +182,9 @@ impl<L: Links> MainDevice<L> {
         let mut application = loop {
             if let Err(error) = self.listen(SLICE) {
                 return Err(Box::new(Refused { error, main_device: self }));
+            }
+            if let Err(error) = self.forwarded().check_identity() {
+                return Err(Box::new(Refused { error: error.into(), main_device: self }));
             }
             match joining.next(&self) {
                 // What the ACTIVE has sent is known, and too old to be followed.

@@ -98,6 +98,9 @@ impl<C: Links> Listening<C> {
         let mut joining = Joining::on(&self.links, policy);
         loop {
             self.forward();
+            if let Err(error) = self.of_two.counters().check_identity() {
+                return Err(self.refused(error.into()));
+            }
             let has_link = self.supervisor.ring_status().links.iter().any(|link| link.carrier != Some(false));
             match joining.decide(&self.listener.heard(), has_link, self.links.now()) {
                 Next::Listen => {}

@@ -11,6 +11,7 @@ mod memory_writes;
 mod outside_links;
 mod random_runs;
 mod rows;
+mod same_identity;
 mod taking_over;
 mod threads;
 

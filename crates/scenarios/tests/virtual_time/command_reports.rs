@@ -184,8 +184,8 @@ fn mail_states_and_polls_of_an_undisturbed_segment_give_no_report() {
         main_device.set_log_filter(LogFilter::default());
         let client = main_device.register_client(Subjects::NONE.with(Subject::Commands), 1000).expect("there is room");
         let large = SdoAddress::new(0x2002, 0);
-        let read =
-            Services::call(&mut main_device, move |engine| start_upload(engine, Position(1), large, LIMITS, 200_000));
+        let read = start_upload(main_device.engine_mut(), Position(1), large, LIMITS, 200_000);
+        let read = main_device.run(read.ended());
         assert_eq!(read.expect("it answers").len(), 100_000);
         main_device.attend(Duration::from_secs(2));
         let declaration = automatic(&main_device.subdevices(), CYCLE);

@@ -88,15 +88,14 @@ fn disturbs(passed: &Passed, stayed: &[StationAddress]) -> bool {
 
 /// A rescan beside the read of a large object, and whether that was still running when the rescan ended.
 fn rescan_beside_a_transfer(main_device: &mut Watched) -> (Rescan, usize, bool) {
-    let both = Services::call(main_device, |engine| {
-        let read = start_upload(engine, TALKER, LARGE, LIMITS, 200_000);
-        let rescan = engine.start_rescan(LIMIT);
-        engine.start(async move {
-            let rescan = rescan.ended().await?;
-            let was_running = read.is_running();
-            let bytes = read.ended().await.map(|data| data.len()).unwrap_or_default();
-            Ok::<_, ServiceError>((rescan, bytes, was_running))
-        })
+    let engine = main_device.engine_mut();
+    let read = start_upload(engine, TALKER, LARGE, LIMITS, 200_000);
+    let rescan = engine.start_rescan(LIMIT);
+    let both = main_device.run(async move {
+        let rescan = rescan.ended().await?;
+        let was_running = read.is_running();
+        let bytes = read.ended().await.map(|data| data.len()).unwrap_or_default();
+        Ok::<_, ServiceError>((rescan, bytes, was_running))
     });
     both.expect("the segment is stable")
 }

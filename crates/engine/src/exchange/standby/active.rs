@@ -141,7 +141,11 @@ impl State {
     fn offer(&mut self, returned: &Returned, events: &mut Producer) {
         let is_accepted = returned.is_taken && returned.answer.is_some_and(|answer| answer.stage == Stage::Accepts);
         self.offered = self.offered.saturating_add(1);
-        if is_accepted {
+        if let Some(write) = self.words.write().filter(|_| !self.is_forced) {
+            // It has begun since the request.
+            self.frames.header.phase = Phase::Goes;
+            events.push(CyclicStandbyEvent::RoleRefused(write).pack());
+        } else if is_accepted {
             self.frames.header.phase = Phase::Ends;
         } else if self.offered >= PATIENCE {
             self.frames.header.phase = Phase::Goes;

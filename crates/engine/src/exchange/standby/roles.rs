@@ -150,6 +150,7 @@ impl State {
     #[cold]
     fn permitted_request(&mut self, now: Instant, events: &mut Producer) -> Option<RoleRequest> {
         let (request, is_forced) = self.control.take_request()?;
+        self.is_forced = is_forced;
         let write = match (self.role, request) {
             _ if is_forced => None,
             (MainDeviceRole::Active, RoleRequest::Inactive | RoleRequest::HandOver) => self.words.write(),

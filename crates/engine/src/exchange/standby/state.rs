@@ -56,6 +56,8 @@ pub(in crate::exchange) struct State {
     pub exchanges_from: Arc<[u8]>,
     pub yields_without_links: bool,
     pub goes_through_init: bool,
+    /// The last request was forced.
+    pub is_forced: bool,
     /// Cycles in which the role was offered.
     pub offered: u8,
     /// The cycle of the ACTIVE that the images show.
