@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use ringcat::tee::Tee;
 use ringcat::{
-    AlState, Application, Error, FrameDirection, FrameReader, Instant, LastOutputs, Link, Links, MainDevice, Options,
-    Position, ServiceError, Services, Taps, automatic,
+    AlState, Application, EngineKey, Error, FrameDirection, FrameReader, Instant, LastOutputs, Link, Links, MainDevice,
+    Options, Position, ServiceError, Services, Taps, automatic,
 };
 use ringcat_engine::{Class, class_of};
 use ringcat_sim::cable::{CableId, DeviceIndex, HostLink};
@@ -205,7 +205,7 @@ fn a_debug_message_that_is_not_allowed_is_refused_and_nothing_is_sent() {
     assert!(error.to_string().contains("at most 1500"), "{error}");
     assert!(frames.take().iter().all(|passed| passed.frame[12..14] == [0x88, 0xA4]));
     // Those that wait are bounded; each is sent once.
-    let queued = Services::call(&mut main_device, |engine| {
+    let queued = Services::call(&mut main_device, EngineKey, |engine| {
         let started: Vec<_> = (0..20).map(|_| engine.start_debug_message(ETHERTYPE, b"x")).collect();
         engine.start(async move {
             let mut queued = 0;
