@@ -261,6 +261,8 @@ pub use ringcat_engine::{SiiProgramError, SiiReadError};
 pub use ringcat_link::pcapng::Direction as FrameDirection;
 #[cfg(feature = "packet")]
 pub use ringcat_link::recorder::{AlreadyRead, FrameNote, FrameReader, Recorded, Recorder, RecorderError, Tap, Taps};
+#[cfg(feature = "engine")]
+pub use services::key::EngineKey;
 
 #[cfg(any(feature = "eni", feature = "esi"))]
 pub use ringcat_config as config;

@@ -6,7 +6,7 @@ use crate::application::Application;
 use crate::links::Links;
 use crate::observer::Observer;
 use crate::services::Services;
-use crate::services::sealed::Sealed;
+use crate::services::key::EngineKey;
 use crate::subdevice::SubDevice;
 
 /// The live status of one declared SubDevice, for any thread.
@@ -69,7 +69,7 @@ impl<S: Services> SubDevice<S> {
     /// not declared.
     pub fn live_status(self) -> S::Immediate<Option<LiveSubDevice>> {
         let (address, services) = self.into_parts();
-        services.immediately(Sealed, move |engine| {
+        services.immediately(EngineKey, move |engine| {
             let all = engine.live_status();
             let Address::Declared(subdevice) = address else { return None };
             (subdevice.0 < all.subdevice_count()).then_some(LiveSubDevice { all, subdevice })

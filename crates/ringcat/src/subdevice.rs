@@ -43,7 +43,7 @@ use crate::application::Application;
 use crate::limits::TransferLimits;
 use crate::links::Links;
 use crate::main_device::MainDevice;
-use crate::services::sealed::Sealed;
+use crate::services::key::EngineKey;
 use crate::services::{Background, Services};
 use crate::supervisor_thread::SupervisorThread;
 
@@ -109,7 +109,7 @@ impl<S: Services> SubDevice<S> {
         W: Future<Output = Result<T, E>> + 'static,
     {
         let SubDevice { services, address, within, .. } = self;
-        services.call(Sealed, move |engine| start(engine, address, within, move |engine| work(engine, address)))
+        services.call(EngineKey, move |engine| start(engine, address, within, move |engine| work(engine, address)))
     }
 
     /// Starts a service of the SubDevice's mailbox. Before activation, a SubDevice in INIT is brought to PREOP.
@@ -120,7 +120,7 @@ impl<S: Services> SubDevice<S> {
         W: Future<Output = Result<T, E>> + 'static,
     {
         let SubDevice { services, address, within, .. } = self;
-        services.call(Sealed, move |engine| start_with_mailbox(engine, address, within, work))
+        services.call(EngineKey, move |engine| start_with_mailbox(engine, address, within, work))
     }
 }
 

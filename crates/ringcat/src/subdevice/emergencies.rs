@@ -4,7 +4,7 @@ use ringcat_engine::mail::EmergencyRing;
 
 use super::SubDevice;
 use crate::services::Services;
-use crate::services::sealed::Sealed;
+use crate::services::key::EngineKey;
 
 impl<S: Services> SubDevice<S> {
     /// The SubDevice's emergencies (CoE). The ring is a handle for any thread: reading, clearing and counting wait for
@@ -25,13 +25,13 @@ impl<S: Services> SubDevice<S> {
     /// ```
     pub fn emergencies(self) -> S::Immediate<EmergencyRing> {
         let address = self.address;
-        self.services.immediately(Sealed, move |engine| engine.emergencies(address))
+        self.services.immediately(EngineKey, move |engine| engine.emergencies(address))
     }
 
     /// Keeps further emergencies of the SubDevice in a new ring of this size, at most [`EmergencyRing::MAX_SIZE`]; the
     /// ring before gets no more. With a size of 0 emergencies are only counted and reported as events.
     pub fn create_emergency_ring(self, size: usize) -> S::Immediate<EmergencyRing> {
         let address = self.address;
-        self.services.immediately(Sealed, move |engine| engine.create_emergency_ring(address, size))
+        self.services.immediately(EngineKey, move |engine| engine.create_emergency_ring(address, size))
     }
 }

@@ -5,7 +5,7 @@ use ringcat_engine::mail::{Lane, MailCounters, Mailbox, MailboxError, Unclaimed,
 
 use super::{SubDevice, SubDeviceError};
 use crate::services::Services;
-use crate::services::sealed::Sealed;
+use crate::services::key::EngineKey;
 
 /// State and counters of a mailbox.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,7 +52,7 @@ impl<S: Services> SubDevice<S> {
     /// State and counters of the mailbox; `None` where it has none.
     pub fn mailbox_status(self) -> S::Immediate<Option<MailboxStatus>> {
         let address = self.address;
-        self.services.immediately(Sealed, move |engine| Some(MailboxStatus::of(&engine.mailbox(address)?)))
+        self.services.immediately(EngineKey, move |engine| Some(MailboxStatus::of(&engine.mailbox(address)?)))
     }
 
     /// Takes the oldest kept mail of a kind that no request waited for: notifications of drives and ADS, vendor
@@ -60,7 +60,7 @@ impl<S: Services> SubDevice<S> {
     /// kind.
     pub fn take_unsolicited(self, kind: Unsolicited) -> S::Immediate<Option<Unclaimed>> {
         let address = self.address;
-        self.services.immediately(Sealed, move |engine| engine.mailbox(address)?.pop_unsolicited(kind))
+        self.services.immediately(EngineKey, move |engine| engine.mailbox(address)?.pop_unsolicited(kind))
     }
 
     /// Waits for mail of a kind that no request waits for, or takes the oldest kept one. The time limit is that of an
@@ -76,7 +76,7 @@ impl<S: Services> SubDevice<S> {
     /// Number of mails of a kind that were not kept, because 32 waited; `None` where it has no mailbox.
     pub fn unsolicited_overruns(self, kind: Unsolicited) -> S::Immediate<Option<u64>> {
         let address = self.address;
-        self.services.immediately(Sealed, move |engine| Some(engine.mailbox(address)?.unsolicited_overruns(kind)))
+        self.services.immediately(EngineKey, move |engine| Some(engine.mailbox(address)?.unsolicited_overruns(kind)))
     }
 
     /// Waits for a vendor message that the SubDevice sends without a request, or takes the oldest kept one. The time

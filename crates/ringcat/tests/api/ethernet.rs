@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use ringcat::eoe::{EthernetEvent, EthernetOptions, HostInterface};
 use ringcat::shared_segment::SharedSegment;
-use ringcat::{CyclicThread, Error, LastOutputs, Options, Services, SubDeviceId, SupervisorThread, automatic};
+use ringcat::{CyclicThread, Error, LastOutputs, Options, SubDeviceId, SupervisorThread, automatic};
 use ringcat_link::TapError;
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
@@ -159,7 +159,7 @@ fn interfaces_of_idle_operation_stay_while_an_application_begins() -> Result<(),
     };
     wait("both have a carrier without an application", have_carrier);
     frames_return(1);
-    let found = Services::immediately(&supervisor, |engine| engine.subdevices())?;
+    let found = supervisor.subdevices()?;
     let application = supervisor.clone().activate(automatic(&found, PERIOD), cyclic)?;
     let cycles = application.start_cycles(|| (), |_| ControlFlow::Continue(()))?;
     wait("all are in OP", || cycles.supervisor().all_settled());

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat::{EmergencyRing, Error, Position, SubDevice, SubDeviceError, SubDeviceId};
+use ringcat::{EmergencyRing, EngineKey, Error, Position, Services, SubDevice, SubDeviceError, SubDeviceId};
 use ringcat_engine::main_device::Pending;
 
 use super::errno::Errno;
@@ -94,8 +94,12 @@ impl Ecrt {
     /// The emergencies of the SubDevice at a position.
     pub fn emergencies_at(&mut self, position: u16) -> Option<EmergencyRing> {
         match &mut self.side {
-            Side::Idle(main_device) => Some(main_device.engine_mut().emergencies(Position(position))),
-            Side::Active(application) => Some(application.engine_mut().emergencies(Position(position))),
+            Side::Idle(main_device) => Some(Services::immediately(&mut **main_device, EngineKey, move |engine| {
+                engine.emergencies(Position(position))
+            })),
+            Side::Active(application) => Some(Services::immediately(&mut **application, EngineKey, move |engine| {
+                engine.emergencies(Position(position))
+            })),
             Side::Changing => None,
         }
     }

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use ringcat::{
-    Application, DomainId, Error, Event, Limits, LogFilter, MainDevice, Options, Position, SdoAddress, Services,
-    SubDeviceId, Subject, Subjects, TimedEvent, automatic, text,
+    Application, DomainId, EngineKey, Error, Event, Limits, LogFilter, MainDevice, Options, Position, SdoAddress,
+    Services, SubDeviceId, Subject, Subjects, TimedEvent, automatic, text,
 };
 use ringcat_engine::{Class, class_of};
 use ringcat_sim::cable::DeviceIndex;
@@ -184,8 +184,9 @@ fn mail_states_and_polls_of_an_undisturbed_segment_give_no_report() {
         main_device.set_log_filter(LogFilter::default());
         let client = main_device.register_client(Subjects::NONE.with(Subject::Commands), 1000).expect("there is room");
         let large = SdoAddress::new(0x2002, 0);
-        let read = start_upload(main_device.engine_mut(), Position(1), large, LIMITS, 200_000);
-        let read = main_device.run(read.ended());
+        let read = Services::call(&mut main_device, EngineKey, move |engine| {
+            start_upload(engine, Position(1), large, LIMITS, 200_000)
+        });
         assert_eq!(read.expect("it answers").len(), 100_000);
         main_device.attend(Duration::from_secs(2));
         let declaration = automatic(&main_device.subdevices(), CYCLE);

@@ -4,8 +4,8 @@
 use std::time::Duration;
 
 use ringcat::{
-    AlState, Identified, Limits, MainDevice, Options, Position, RegisterAddress, Rescan, SdoAddress, ServiceError,
-    Services, StationAddress,
+    AlState, EngineKey, Identified, Limits, MainDevice, Options, Position, RegisterAddress, Rescan, SdoAddress,
+    ServiceError, Services, StationAddress,
 };
 use ringcat_sim::cable::{CableId, DeviceIndex, HostLink};
 use ringcat_sim::fault::Fault;
@@ -88,14 +88,15 @@ fn disturbs(passed: &Passed, stayed: &[StationAddress]) -> bool {
 
 /// A rescan beside the read of a large object, and whether that was still running when the rescan ended.
 fn rescan_beside_a_transfer(main_device: &mut Watched) -> (Rescan, usize, bool) {
-    let engine = main_device.engine_mut();
-    let read = start_upload(engine, TALKER, LARGE, LIMITS, 200_000);
-    let rescan = engine.start_rescan(LIMIT);
-    let both = main_device.run(async move {
-        let rescan = rescan.ended().await?;
-        let was_running = read.is_running();
-        let bytes = read.ended().await.map(|data| data.len()).unwrap_or_default();
-        Ok::<_, ServiceError>((rescan, bytes, was_running))
+    let both = Services::call(main_device, EngineKey, |engine| {
+        let read = start_upload(engine, TALKER, LARGE, LIMITS, 200_000);
+        let rescan = engine.start_rescan(LIMIT);
+        engine.start(async move {
+            let rescan = rescan.ended().await?;
+            let was_running = read.is_running();
+            let bytes = read.ended().await.map(|data| data.len()).unwrap_or_default();
+            Ok::<_, ServiceError>((rescan, bytes, was_running))
+        })
     });
     both.expect("the segment is stable")
 }

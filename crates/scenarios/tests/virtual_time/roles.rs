@@ -4,10 +4,10 @@ use std::future::Future;
 use std::time::Duration;
 
 use ringcat::{
-    Acknowledge, ActivateError, AlState, AlStatus, Application, ConfigureError, Declaration, EepromAssignment, Error,
-    Function, InformationError, Limits, ListType, Mailbox, MailboxError, MainDevice, MainDevicePhase, MainDeviceRole,
-    NotPermitted, Options, Pending, Position, RawDatagram, RegisterAddress, SdoAddress, SdoFailure, ServiceError,
-    Services, StateScope, StatesError, StopError, Subjects,
+    Acknowledge, ActivateError, AlState, AlStatus, Application, ConfigureError, Declaration, EepromAssignment,
+    EngineKey, Error, Function, InformationError, Limits, ListType, Mailbox, MailboxError, MainDevice, MainDevicePhase,
+    MainDeviceRole, NotPermitted, Options, Pending, Position, RawDatagram, RegisterAddress, SdoAddress, SdoFailure,
+    ServiceError, Services, StateScope, StatesError, StopError, Subjects,
 };
 use ringcat_engine::mail::coe::pdo_mail::{self, PdoMailError};
 use ringcat_engine::mail::coe::{self, information};
@@ -316,8 +316,7 @@ fn each_function_is_refused_in_the_roles_and_phases_of_the_table_and_in_no_other
             Services::set_role(&mut main_device, role);
             assert_eq!((Services::role(&mut main_device), Services::phase(&mut main_device)), (role, phase));
             assert_eq!(main_device.permission(function), function.permission(role, phase));
-            let pending = call(main_device.engine_mut(), function);
-            let denied = main_device.run(pending.ended());
+            let denied = Services::call(&mut main_device, EngineKey, move |engine| call(engine, function));
             let denied = denied.unwrap_or_else(|error| panic!("{function:?} in {phase:?}: {error}"));
             evaluate(denied, function, role, phase);
             count += 1;
@@ -350,8 +349,8 @@ fn role_inactive_sends_nothing_for_a_call_and_all_work_again_when_it_is_active()
     for function in Function::ALL.iter().copied().filter(|function| function.needs_the_bus()) {
         Services::set_role(&mut main_device, MainDeviceRole::Inactive);
         frames.take();
-        let pending = call(main_device.engine_mut(), function);
-        let denied = main_device.run(pending.ended()).expect("it is answered");
+        let denied =
+            Services::call(&mut main_device, EngineKey, move |engine| call(engine, function)).expect("it is answered");
         evaluate(denied, function, MainDeviceRole::Inactive, MainDevicePhase::Idle);
         main_device.attend(Duration::from_millis(20));
         let sent = frames.take().into_iter().filter(|passed| passed.is_sent).count();

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use ringcat::tee::Tee;
 use ringcat::{
-    AlState, Application, Error, FrameDirection, FrameReader, Instant, LastOutputs, Link, Links, MainDevice, Options,
-    Position, ServiceError, Services, Taps, automatic,
+    AlState, Application, EngineKey, Error, FrameDirection, FrameReader, Instant, LastOutputs, Link, Links, MainDevice,
+    Options, Position, ServiceError, Services, Taps, automatic,
 };
 use ringcat_engine::{Class, class_of};
 use ringcat_sim::cable::{CableId, DeviceIndex, HostLink};
@@ -205,16 +205,17 @@ fn a_debug_message_that_is_not_allowed_is_refused_and_nothing_is_sent() {
     assert!(error.to_string().contains("at most 1500"), "{error}");
     assert!(frames.take().iter().all(|passed| passed.frame[12..14] == [0x88, 0xA4]));
     // Those that wait are bounded; each is sent once.
-    let engine = main_device.engine_mut();
-    let started: Vec<_> = (0..20).map(|_| engine.start_debug_message(ETHERTYPE, b"x")).collect();
-    let queued = main_device.run(async move {
-        let mut queued = 0;
-        for message in started {
-            queued += usize::from(message.ended().await.is_ok());
-        }
-        queued
+    let queued = Services::call(&mut main_device, EngineKey, |engine| {
+        let started: Vec<_> = (0..20).map(|_| engine.start_debug_message(ETHERTYPE, b"x")).collect();
+        engine.start(async move {
+            let mut queued = 0;
+            for message in started {
+                queued += usize::from(message.ended().await.is_ok());
+            }
+            Ok::<_, ServiceError>(queued)
+        })
     });
-    assert_eq!(queued, 16);
+    assert_eq!(queued.expect("it is answered"), 16);
     main_device.attend(Duration::from_millis(5));
     let sent = frames.take().iter().filter(|it| it.is_sent && it.frame[12..14] == [0x88, 0xB5]).count();
     assert_eq!(sent, 16);
