@@ -201,12 +201,12 @@ fn another_identity_prevents_op_where_it_is_compared() {
     let (own, other) = (types("11"), types("12"));
     let (own, other): (Vec<&str>, Vec<&str>) =
         (own.iter().map(String::as_str).collect(), other.iter().map(String::as_str).collect());
-    let compared = |optional: bool| {
+    let declared = |optional: bool| {
         file_of(&own, |file| (file.subdevice[1].serial, file.subdevice[1].optional) = (Some(11), optional))
     };
-    assert_eq!(kinds(&compared(&compared(false), &own)), []);
-    assert_eq!(kinds(&compared(&compared(false), &other)), [(Serial, true)]);
-    assert_eq!(kinds(&compared(&compared(true), &other)), [(Serial, false)]);
+    assert_eq!(kinds(&compared(&declared(false), &own)), []);
+    assert_eq!(kinds(&compared(&declared(false), &other)), [(Serial, true)]);
+    assert_eq!(kinds(&compared(&declared(true), &other)), [(Serial, false)]);
     let revision = |check: CheckRevision| {
         file_of(&own, |file| {
             file.subdevice[1].revision = file.subdevice[1].revision.map(|revision| revision + 1);
@@ -345,21 +345,21 @@ fn subdevices_by_alias_that_have_changed_places_are_one_difference() {
             (subdevice.position, subdevice.alias) = (None, Some(alias));
         }
     });
-    assert_eq!(kinds(&judged(&network, &types)), []);
+    assert_eq!(kinds(&compared(&network, &types)), []);
     let mut exchanged = types;
     exchanged.swap(1, 2);
-    let differences = judged(&network, &exchanged);
+    let differences = compared(&network, &exchanged);
     assert_eq!(kinds(&differences), [(Order, false)], "{differences:#?}");
     for part in [&network.file.subdevice[1].name, &network.file.subdevice[2].name, "at positions 2 and 1"] {
         assert!(differences[0].text.contains(part), "{}: {part}", differences[0].text);
     }
     // The one behind the others: those that are declared by position are not at theirs.
     let behind = [types[0], types[2], types[3], types[4], types[1]];
-    let differences = judged(&network, &behind);
+    let differences = compared(&network, &behind);
     assert_eq!(kinds(&differences), [(Order, true)], "{differences:#?}");
     assert!(differences[0].text.contains("is at position 3, the file has it at position 4"), "{}", differences[0].text);
     // Only one of them at another place: the cables of its neighbours are no differences of their own.
     let moved = [types[0], types[2], types[3], types[1], types[4]];
-    let differences = judged(&network, &moved);
+    let differences = compared(&network, &moved);
     assert_eq!(kinds(&differences), [(Cable, false)], "{differences:#?}");
 }
