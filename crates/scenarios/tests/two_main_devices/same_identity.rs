@@ -86,13 +86,17 @@ fn a_maindevice_with_the_identity_of_the_active_does_not_join_its_ring() {
     for second in [[0x11, 0x22], [0x21, 0x11], [0x11, 0x12]] {
         let mut hosts = TwoHosts::new(ring_of_two(4, Host::First));
         let (ends, ended) = channel();
+        // The second one is not there yet.
+        hosts.with_network(|network| {
+            Host::Second.links().into_iter().for_each(|link| _ = network.disconnect(link, true));
+        });
         let (first, ms) = (PerLink::new(address(0x11), Some(address(0x12))), Duration::from_millis);
         start(&mut hosts, Host::First, first, ms(10), ends.clone());
         hosts.run_for(ms(1500));
         let in_op = |hosts: &mut TwoHosts| {
             hosts.with_network(|network| network.devices().all(|it| it.al_status() == AlStatus::new(AlState::Op)))
         };
-        assert!(in_op(&mut hosts), "{second:x?}");
+        assert!(in_op(&mut hosts), "{second:x?}: {:?}", ended.try_recv());
         let second_links = PerLink::new(address(second[0]), Some(address(second[1])));
         start(&mut hosts, Host::Second, second_links, ms(500), ends);
         hosts.run_for(ms(300));

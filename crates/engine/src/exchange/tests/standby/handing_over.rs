@@ -2,6 +2,7 @@
 //! (protocol FR-09).
 
 use ringcat_wire::master_frame::NotReady;
+use ringcat_wire::memory_write::{MemoryWrite, WriteKind};
 
 use super::duo::{DOMAIN, Duo, End, PERIOD};
 use crate::event::CyclicStandbyEvent;
@@ -67,6 +68,35 @@ fn a_role_that_the_other_one_does_not_take_is_kept_and_that_is_reported() {
     duo.end = End::Closed;
     count(&mut duo, 80, 80);
     assert!(duo.first.is_active() && duo.first.standby_events().iter().any(refused));
+}
+
+// covers: MR-07, MR-17, standby
+#[test]
+fn a_write_that_begins_while_the_role_is_offered_keeps_it_unless_it_is_forced() {
+    let write = MemoryWrite::new(WriteKind::File, false, 1);
+    for is_forced in [false, true] {
+        let mut duo = Duo::new(MasterSizes::default());
+        count(&mut duo, 0, 5);
+        duo.drain();
+        if is_forced {
+            duo.first.control.force(RoleRequest::HandOver);
+        } else {
+            duo.first.control.request(RoleRequest::HandOver);
+        }
+        count(&mut duo, 5, 1);
+        duo.first.words.post_write(Some(write));
+        count(&mut duo, 6, 10);
+        assert_eq!((duo.first.is_active(), duo.second.is_active()), (!is_forced, is_forced));
+        let refused = CyclicStandbyEvent::RoleRefused(write);
+        let events = duo.first.standby_events();
+        assert_eq!(events.iter().filter(|event| **event == refused).count(), usize::from(!is_forced), "{events:?}");
+        duo.first.words.post_write(None);
+        count(&mut duo, 20, 3);
+        let control = if is_forced { &duo.second.control } else { &duo.first.control };
+        control.request(RoleRequest::HandOver);
+        count(&mut duo, 30, 10);
+        assert_eq!(duo.first.is_active(), is_forced);
+    }
 }
 
 // covers: FR-09, 9.8, standby
