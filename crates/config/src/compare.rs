@@ -14,6 +14,8 @@ mod marks;
 mod moves;
 mod order;
 mod process_data;
+mod properties;
+mod replugged;
 
 use std::collections::BTreeSet;
 
@@ -25,7 +27,8 @@ use ringcat_wire::address::Position;
 use crate::configuration::Configuration;
 use align::Place;
 
-pub use difference::{Difference, DifferenceKind, FoundNetwork, Stated};
+pub use difference::{Difference, DifferenceKind, FoundNetwork, Stated, StatedSyncManager};
+pub(crate) use properties::ports;
 
 impl Configuration {
     /// Names of the SubDevices for messages: name and station address of the file.
@@ -83,7 +86,7 @@ impl Configuration {
     }
 
     /// Every difference between the network of a scan and the file: SubDevices that are missing, additional or at
-    /// another place, revision, serial number, PDOs, mailboxes, cables. `stated` are the [`Stated`] properties by the
+    /// another place, revision, serial number, PDOs, mailboxes, SyncManagers, ports, cables. `stated` are the [`Stated`] properties by the
     /// index of the SubDevice; it may be empty.
     pub fn differences(&self, network: FoundNetwork<'_>, stated: &[Stated]) -> Vec<Difference> {
         let FoundNetwork { subdevices: found, topology, firmware } = network;

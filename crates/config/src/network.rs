@@ -14,6 +14,7 @@ pub mod model;
 mod read;
 #[cfg(test)]
 mod schema;
+mod stated;
 mod to_eni;
 mod unique;
 mod values;

@@ -42,8 +42,8 @@ pub struct Compare {
 #[derive(Clone, Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Difference {
-    /// missing, additional, order, device, revision, serial, identification, pdos, mailbox, process data, firmware or
-    /// cable
+    /// missing, additional, order, device, revision, serial, identification, pdos, mailbox, protocols, sync manager,
+    /// ports, process data, firmware or cable
     pub kind: String,
     /// Index of the SubDevice in the file, from 0; null for one that is not in it
     pub subdevice: Option<usize>,

@@ -1,4 +1,4 @@
-//! One SubDevice: identity, PDOs and mailboxes of the file and of the bus.
+//! One SubDevice: identity, PDOs, mailboxes and properties of the file and of the bus.
 
 use std::collections::BTreeSet;
 
@@ -12,6 +12,7 @@ use ringcat_engine::plan;
 use super::assignment;
 use super::difference::{Difference, DifferenceKind, Stated};
 use super::process_data;
+use super::properties::{self, buffers, words};
 
 /// A SubDevice of the file and the one that was found.
 pub(super) struct Both<'a> {
@@ -40,13 +41,15 @@ impl Both<'_> {
         }
         let mut add = |kind, prevents_op, text: String| differences.push(self.difference(kind, prevents_op, text));
         if let Some(expected) = mailbox(declared, stated) {
-            let got =
-                info.mailbox.as_ref().map(|it| [(it.receive_offset, it.receive_size), (it.send_offset, it.send_size)]);
+            let got = info.mailbox.as_ref().map(buffers);
             if got != Some(expected) {
-                let text = format!("expected mailboxes {}, got {}", buffers(Some(expected)), buffers(got));
+                let text = format!("expected mailboxes {}, got {}", words(Some(expected)), words(got));
                 // An ENI has its own SyncManagers, which are written; a network file takes those of the SII.
                 add(DifferenceKind::Mailbox, declared.declared.is_some(), text);
             }
+        }
+        for (kind, text) in properties::differences(declared, stated, info) {
+            add(kind, false, text);
         }
         self.process_data(differences);
         let mut add = |kind, prevents_op, text: String| differences.push(self.difference(kind, prevents_op, text));
@@ -144,11 +147,6 @@ fn mailbox(declared: &SubDeviceConfig, stated: Option<&Stated>) -> Option<[(u16,
     };
     let own = of(SyncManagerRole::MailboxOut).zip(of(SyncManagerRole::MailboxIn)).map(|(out, back)| [out, back]);
     own.or(stated.and_then(|stated| stated.mailbox))
-}
-
-fn buffers(mailbox: Option<[(u16, u16); 2]>) -> String {
-    let Some([(out, out_length), (back, back_length)]) = mailbox else { return "none".to_owned() };
-    format!("{out:#06x} ({out_length} bytes) and {back:#06x} ({back_length} bytes)")
 }
 
 /// How a PDO differs from the one that the SubDevice describes. A SubDevice that describes no PDO at all has no

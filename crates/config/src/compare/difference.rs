@@ -7,6 +7,7 @@ use ringcat_engine::config::IdentityField;
 use ringcat_engine::declared::SubDeviceId;
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_wire::address::Position;
+use ringcat_wire::sii::{CoeDetails, MailboxProtocols};
 
 /// A difference between a network and a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,6 +47,12 @@ pub enum DifferenceKind {
     Pdos,
     /// Other mailboxes.
     Mailbox,
+    /// Other mailbox protocols, or other features of CoE.
+    Protocols,
+    /// Another address or control byte of a SyncManager with process data.
+    SyncManager,
+    /// Other ports.
+    Ports,
     /// The process data of the file cannot be set up.
     ProcessData,
     /// Another firmware version.
@@ -67,6 +74,9 @@ impl DifferenceKind {
             DifferenceKind::Identification => "identification",
             DifferenceKind::Pdos => "pdos",
             DifferenceKind::Mailbox => "mailbox",
+            DifferenceKind::Protocols => "protocols",
+            DifferenceKind::SyncManager => "sync manager",
+            DifferenceKind::Ports => "ports",
             DifferenceKind::ProcessData => "process data",
             DifferenceKind::Firmware => "firmware",
             DifferenceKind::Cable => "cable",
@@ -101,11 +111,33 @@ pub struct Stated {
     pub revision: Option<u32>,
     /// Mailboxes: start and length of the one that the MainDevice writes, and of the one that it reads.
     pub mailbox: Option<[(u16, u16); 2]>,
+    /// The same in BOOT.
+    pub boot_mailbox: Option<[(u16, u16); 2]>,
+    /// Mailbox protocols.
+    pub protocols: Option<MailboxProtocols>,
+    /// Complete access, and whether PDO assignment and mapping can be written; the other bits are not compared.
+    pub coe: Option<CoeDetails>,
+    /// SyncManagers with process data.
+    pub sync_managers: Vec<StatedSyncManager>,
+    /// Kind of its ports, a letter each as in a network file; empty if they are not compared.
+    pub ports: String,
     /// Version of the firmware (object 0x100A); empty if it is not compared.
     pub firmware: String,
     /// It has modules in slots (object 0xF050): its EEPROM lists only the PDOs of the head. Start-up commands for
     /// 0xF030 show this as well.
     pub modular: bool,
+}
+
+/// A SyncManager that a file states as the EEPROM describes it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct StatedSyncManager {
+    /// Its number.
+    pub number: u8,
+    /// Its address.
+    pub start: Option<u16>,
+    /// Its control byte.
+    pub control: Option<u8>,
 }
 
 /// A network that was found.

@@ -19,6 +19,7 @@ use ringcat_wire::al::AlState;
 
 use super::commands;
 use super::model::{self, CheckRevision, Junctions, Lrw, NetworkFile, Repeat, SubDevice, SyncManager, Target};
+use super::stated::stated;
 use super::unique::Names;
 use super::values::{Shift, Time};
 use super::write::next_position;
@@ -94,15 +95,6 @@ impl NetworkFile {
     /// What the file states of each SubDevice besides the declaration, for
     /// [`Configuration::differences`](crate::Configuration::differences).
     pub fn stated(&self) -> Vec<Stated> {
-        let stated = |subdevice: &SubDevice| Stated {
-            device: subdevice.vendor.zip(subdevice.product),
-            revision: subdevice.revision,
-            mailbox: subdevice.mailbox.as_ref().map(|mailbox| {
-                [(mailbox.write.start, mailbox.write.length), (mailbox.read.start, mailbox.read.length)]
-            }),
-            firmware: subdevice.firmware.clone(),
-            modular: false,
-        };
         self.subdevice.iter().map(stated).collect()
     }
 

@@ -7,7 +7,6 @@ use ringcat_engine::Topology;
 use ringcat_engine::config::SubDeviceConfig;
 use ringcat_engine::info::{Direction, PdoInfo, SubDeviceInfo};
 use ringcat_engine::{AreaPlan, MappedPdo, plan};
-use ringcat_wire::register::PortKind;
 use ringcat_wire::sii::MailboxLayout;
 
 use super::model::{
@@ -16,14 +15,11 @@ use super::model::{
 };
 use super::unique::Names;
 use super::values::Time;
+use crate::compare::ports;
 use crate::esi::sii::name_of;
 
 /// Name of the only domain.
 const DOMAIN: &str = "cycle";
-/// Kinds of ports in the SII, a nibble per port (protocol 4.3).
-const MII: u16 = 1;
-const EBUS: u16 = 3;
-const FAST_HOT_CONNECT: u16 = 4;
 
 /// Choices for a network file from a scan.
 #[derive(Clone, Debug)]
@@ -117,23 +113,6 @@ fn names(found: &[SubDeviceInfo]) -> Vec<String> {
 fn printable(text: &str) -> String {
     let text: String = text.chars().filter(|character| !character.is_control()).collect();
     text.trim().to_owned()
-}
-
-/// The letters of the ports: from the SII, otherwise from the controller.
-fn ports(info: &SubDeviceInfo) -> String {
-    let letter = |port: usize| match (info.physical_ports >> (4 * port)) & 0xF {
-        MII => 'Y',
-        EBUS => 'K',
-        FAST_HOT_CONNECT => 'H',
-        _ if info.physical_ports != 0 => ' ',
-        _ => match info.controller.ports[port] {
-            PortKind::Mii => 'Y',
-            PortKind::Ebus => 'K',
-            PortKind::NotImplemented | PortKind::NotConfigured => ' ',
-        },
-    };
-    let letters: String = (0..4).map(letter).collect();
-    letters.trim_end().to_owned()
 }
 
 fn plugged_into(info: &SubDeviceInfo, topology: &Topology, names: &[String]) -> Option<PluggedInto> {

@@ -200,7 +200,8 @@ pub struct SubDevice {
     /// Version of its firmware (object 0x100A), for `compare`.
     #[serde(default)]
     pub firmware: String,
-    /// Kind of its ports 0 to 3, a letter each, Y: MII, K: E-bus, H: E-bus hot connect, blank: none; for exports.
+    /// Kind of its ports 0 to 3, a letter each, Y: MII, K: E-bus, H: fast hot connect, blank: none; for exports and
+    /// `compare`.
     #[serde(default)]
     pub ports: String,
     /// The SubDevice and the port that its port 0 is plugged into. A difference is reported.
@@ -210,7 +211,7 @@ pub struct SubDevice {
     /// State to which it is brought.
     #[serde(default)]
     pub target: Target,
-    /// Mailboxes as its EEPROM describes them, for exports.
+    /// Mailboxes as its EEPROM describes them, for exports and `compare`.
     pub mailbox: Option<Mailbox>,
     /// SyncManagers with process data. Without any, all PDOs are those of the EEPROM.
     #[serde(default)]
@@ -355,9 +356,9 @@ pub struct SyncManager {
     pub number: u8,
     /// Outputs of the MainDevice, or inputs.
     pub direction: Direction,
-    /// Its address as the EEPROM describes it, for exports.
+    /// Its address as the EEPROM describes it, for exports and `compare`.
     pub start: Option<u16>,
-    /// Its control byte as the EEPROM describes it, for exports.
+    /// Its control byte as the EEPROM describes it, for exports and `compare`.
     pub control: Option<u8>,
     /// It is enabled in OP only, for exports.
     #[serde(default)]

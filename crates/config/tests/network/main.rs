@@ -4,6 +4,7 @@
 mod bad_files;
 mod differences;
 mod generated;
+mod properties;
 mod reading;
 
 /// A file with all keys, in canonical form.

@@ -4,7 +4,7 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use ringcat_config::eni::{Eni, EniError, MAX_BYTES, read};
+use ringcat_config::eni::{Eni, EniError, MAX_BYTES, Mailbox, MailboxBuffer, read};
 use ringcat_config::{Configuration, Difference, Stated, follow};
 use ringcat_engine::Topology;
 use ringcat_engine::info::SubDeviceInfo;
@@ -13,6 +13,7 @@ use ringcat_engine::main_device::Declaration;
 use ringcat_sim::network::Network;
 #[cfg(feature = "sim")]
 use ringcat_sim::segment::SegmentError;
+use ringcat_wire::sii::MailboxProtocols;
 
 #[cfg(feature = "sim")]
 use super::segment::segment;
@@ -135,6 +136,11 @@ impl EniFile {
             let mut stated = Stated::default();
             stated.device = subdevice.vendor_id.zip(subdevice.product_code);
             stated.revision = subdevice.revision;
+            stated.ports = ports(&subdevice.physics);
+            if let Some(mailbox) = &subdevice.mailbox {
+                stated.protocols = Some(protocols(&mailbox.protocols));
+                stated.boot_mailbox = boot_mailbox(mailbox);
+            }
             stated
         };
         self.eni.subdevices.iter().map(stated).collect()
@@ -153,4 +159,35 @@ impl EniFile {
     pub fn simulated(&self, ring: bool) -> Result<Network, SegmentError> {
         Network::from_description(segment(&self.eni, &self.configuration, ring))
     }
+}
+
+/// Letters of the ports as in a network file; others are no port. In an ENI fast hot connect is `B`.
+fn ports(physics: &str) -> String {
+    let letter = |kind: char| match kind {
+        'Y' | 'K' => kind,
+        'H' | 'B' => 'H',
+        _ => ' ',
+    };
+    physics.chars().take(4).map(letter).collect()
+}
+
+fn protocols(names: &[String]) -> MailboxProtocols {
+    let bit = |name: &String| match name.trim().to_ascii_uppercase().as_str() {
+        "AOE" => MailboxProtocols::AOE,
+        "EOE" => MailboxProtocols::EOE,
+        "COE" => MailboxProtocols::COE,
+        "FOE" => MailboxProtocols::FOE,
+        "SOE" => MailboxProtocols::SOE,
+        "VOE" => MailboxProtocols::VOE,
+        _ => 0,
+    };
+    MailboxProtocols(names.iter().map(bit).fold(0, |all, bit| all | bit))
+}
+
+/// Mailboxes in BOOT. EC-Engineer repeats the others where the device has none of its own: they say nothing.
+fn boot_mailbox(of: &Mailbox) -> Option<[(u16, u16); 2]> {
+    let place = |buffer: &MailboxBuffer| (buffer.start, buffer.length);
+    let boot = of.bootstrap.as_ref().map(|(write, read)| [place(write), place(read)])?;
+    let standard = of.send.as_ref().zip(of.receive.as_ref()).map(|(write, read)| [place(write), place(read)]);
+    (standard != Some(boot)).then_some(boot)
 }

@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use ringcat::config::network::model::{CheckRevision, Entry, Required, SubDevice};
+use ringcat::config::network::model::{CheckRevision, Entry, Protocol, Required, SubDevice};
 use ringcat::config::{Difference, DifferenceKind, ExportOptions, FoundNetwork, Stated};
 use ringcat::eni::EniFile;
 use ringcat::network::{LoadedNetwork, NetworkFile, ScanOptions};
@@ -11,7 +11,10 @@ use ringcat::simulated::SimulatedSegment;
 use ringcat::{Declaration, MainDevice, Options, Scan};
 use ringcat_wire::al::{AlState, AlStatus};
 
-use DifferenceKind::{Additional, Cable, Device, Identification, Mailbox, Missing, Order, Pdos, Revision, Serial};
+use DifferenceKind::{
+    Additional, Cable, Device, Identification, Mailbox, Missing, Order, Pdos, Ports, Protocols, Revision, Serial,
+    SyncManager,
+};
 
 const LIMIT: Duration = Duration::from_secs(5);
 const PERIOD: Duration = Duration::from_millis(1);
@@ -295,11 +298,17 @@ fn cables_and_mailboxes_of_a_network_file_do_not_prevent_op() {
 #[test]
 fn differences_from_an_eni_are_judged_by_the_bus_too() {
     type Change = fn(&mut NetworkFile);
-    let changes: [(Change, &[(DifferenceKind, bool)]); 4] = [
+    let changes: [(Change, &[(DifferenceKind, bool)]); 7] = [
         (|_| (), &[]),
         (|file| file.subdevice[DRIVE].mailbox.as_mut().expect("CoE").read.length -= 2, &[(Mailbox, true)]),
         (|file| pdo_entries(&mut file.subdevice[OUTPUTS])[0].bits += 8, &[(Pdos, true)]),
         (|file| drop(pdo_entries(&mut file.subdevice[DRIVE]).pop()), &[(Pdos, false)]),
+        (|file| file.subdevice[DRIVE].sync_manager[0].start = Some(0x1D00), &[(SyncManager, false)]),
+        (
+            |file| file.subdevice[DRIVE].mailbox.as_mut().expect("CoE").protocols.push(Protocol::SoE),
+            &[(Protocols, false)],
+        ),
+        (|file| file.subdevice[DRIVE].ports = "KKY".to_owned(), &[(Ports, false)]),
     ];
     for (change, expected) in changes {
         let file = file_of(&BUS, change).file;
@@ -312,4 +321,28 @@ fn differences_from_an_eni_are_judged_by_the_bus_too() {
         let is_prevented = differences.iter().any(|it| it.prevents_op);
         assert_eq!(!is_prevented, reaches_op(main_device, eni.declaration(false)), "{differences:#?}");
     }
+}
+
+/// The place of a SubDevice that is declared by its alias does not count for an activation; the cables show it.
+// covers: network-file
+#[test]
+fn subdevices_by_alias_that_have_changed_places_are_one_difference() {
+    let types = ["coupler", "digital-output-8 alias=7", "analog-input-4 alias=8", "servo", "digital-output-8"];
+    let network = file_of(&types, |file| {
+        for (subdevice, alias) in file.subdevice[1..3].iter_mut().zip([7, 8]) {
+            (subdevice.position, subdevice.alias) = (None, Some(alias));
+        }
+    });
+    assert_eq!(kinds(&judged(&network, &types)), []);
+    let mut exchanged = types;
+    exchanged.swap(1, 2);
+    let differences = judged(&network, &exchanged);
+    assert_eq!(kinds(&differences), [(Order, false)], "{differences:#?}");
+    for part in [&network.file.subdevice[1].name, &network.file.subdevice[2].name, "at positions 2 and 1"] {
+        assert!(differences[0].text.contains(part), "{}: {part}", differences[0].text);
+    }
+    // Only one of them at another place: the cables of its neighbours are no differences of their own.
+    let moved = [types[0], types[2], types[3], types[1], types[4]];
+    let differences = judged(&network, &moved);
+    assert!(differences.iter().all(|it| it.kind != Cable) || differences.len() == 1, "{differences:#?}");
 }
