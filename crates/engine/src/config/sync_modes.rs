@@ -26,9 +26,9 @@ pub enum ModeError {
         /// Cycles of the MainDevice per cycle of SYNC0; negative: cycles of SYNC0 per cycle of the MainDevice.
         factor: i16,
     },
-    /// SYNC1 would be faster than SYNC0, which controllers cannot do, or its cycle does not fit 32 bits.
+    /// The cycle of SYNC1 would be no multiple of that of SYNC0, which controllers cannot do, or does not fit 32 bits.
     Sync1Cycle {
-        /// Cycles of SYNC0 per cycle of SYNC1.
+        /// Cycles of SYNC0 per cycle of SYNC1; negative: cycles of SYNC1 per cycle of the MainDevice.
         factor: i16,
     },
 }
@@ -43,7 +43,7 @@ impl fmt::Display for ModeError {
                 write!(f, "no SYNC0 cycle in whole nanoseconds follows from factor {factor} and the MainDevice's cycle")
             }
             ModeError::Sync1Cycle { factor } => {
-                write!(f, "no SYNC1 cycle follows from factor {factor} and the cycle of SYNC0")
+                write!(f, "no SYNC1 cycle that is a multiple of SYNC0's follows from factor {factor}")
             }
         }
     }
@@ -60,8 +60,8 @@ impl SyncSignals {
     /// The signals of an operation mode of the SII, for a MainDevice with this cycle.
     ///
     /// The cycle of SYNC0 is that of the mode if it has one; otherwise the cycle of the MainDevice times the factor (a
-    /// negative factor divides, 0 counts as 1). The cycle of SYNC1 is that of SYNC0 times its factor. Shifts are
-    /// signed.
+    /// negative factor divides, 0 counts as 1). The cycle of SYNC1 is that of SYNC0 times its factor; with a negative
+    /// factor it is the cycle of the MainDevice divided by it (protocol ES-62). Shifts are signed.
     ///
     /// # Errors
     /// A mode without signals, or with impossible cycles.
@@ -72,11 +72,11 @@ impl SyncSignals {
         let has_sync1 = mode.assign_activate & SYNC1 != 0;
         let sync0_cycle_ns =
             sync0_cycle(mode, cycle).ok_or(ModeError::Sync0Cycle { factor: mode.sync0_cycle_factor })?;
-        let sync1_cycle = u32::try_from(mode.sync1_cycle_factor).ok().and_then(|f| f.checked_mul(sync0_cycle_ns));
-        let sync1_cycle_ns = match sync1_cycle {
-            Some(cycle_ns) if has_sync1 => cycle_ns,
-            None if has_sync1 => return Err(ModeError::Sync1Cycle { factor: mode.sync1_cycle_factor }),
-            Some(_) | None => 0,
+        let sync1_cycle_ns = if has_sync1 {
+            let sync1 = sync1_cycle(mode.sync1_cycle_factor, sync0_cycle_ns, cycle);
+            sync1.ok_or(ModeError::Sync1Cycle { factor: mode.sync1_cycle_factor })?
+        } else {
+            0
         };
         Ok(SyncSignals {
             assign_activate: mode.assign_activate,
@@ -102,6 +102,15 @@ fn sync0_cycle(mode: &DcMode, cycle: Duration) -> Option<u32> {
     u32::try_from(wanted).ok().filter(|ns| *ns > 0)
 }
 
+fn sync1_cycle(factor: i16, sync0_ns: u32, cycle: Duration) -> Option<u32> {
+    let divided = match u32::try_from(factor) {
+        Ok(factor) => return factor.checked_mul(sync0_ns),
+        Err(_) => cycle.as_nanos() / u128::from(factor.unsigned_abs()),
+    };
+    let is_whole = cycle.as_nanos().is_multiple_of(factor.unsigned_abs().into());
+    u32::try_from(divided).ok().filter(|ns| is_whole && *ns > 0 && ns.is_multiple_of(sync0_ns))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -112,7 +121,7 @@ mod tests {
         DcMode { assign_activate, sync0_cycle_factor: factors.0, sync1_cycle_factor: factors.1, ..DcMode::default() }
     }
 
-    // covers: 4.6, dc-tools
+    // covers: 4.6, ES-62, dc-tools
     #[test]
     fn factors_and_shifts_of_a_mode_become_signals() {
         let cycles = |mode: &DcMode| {
@@ -122,6 +131,9 @@ mod tests {
         assert_eq!(cycles(&mode(0x0300, (0, 7))), Ok((1_000_000, 0)));
         assert_eq!(cycles(&mode(0x0730, (-4, 4))), Ok((250_000, 1_000_000)));
         assert_eq!(cycles(&mode(0x0700, (2, 0))), Ok((2_000_000, 0)));
+        assert_eq!(cycles(&mode(0x0700, (1, -1))), Ok((1_000_000, 1_000_000)));
+        assert_eq!(cycles(&mode(0x0700, (-4, -1))), Ok((250_000, 1_000_000)));
+        assert_eq!(cycles(&mode(0x0700, (-4, -2))), Ok((250_000, 500_000)));
         assert_eq!(cycles(&DcMode { sync0_cycle_ns: 62_500, ..mode(0x0700, (3, 2)) }), Ok((62_500, 125_000)));
         let shifted = DcMode { sync0_shift_ns: -10_000_i32 as u32, sync1_shift_ns: 20_000, ..mode(0x0720, (1, 1)) };
         let signals = SyncSignals::from_mode(&shifted, CYCLE).expect("it has signals");
@@ -140,7 +152,8 @@ mod tests {
         }
         assert_eq!(error(&mode(0x0300, (-3, 0))), ModeError::Sync0Cycle { factor: -3 });
         assert_eq!(error(&mode(0x0300, (i16::MAX, 0))), ModeError::Sync0Cycle { factor: i16::MAX });
-        assert_eq!(error(&mode(0x0700, (1, -2))), ModeError::Sync1Cycle { factor: -2 });
-        assert_eq!(error(&mode(0x0700, (1, i16::MAX))), ModeError::Sync1Cycle { factor: i16::MAX });
+        for (sync0, sync1) in [(1, -2), (2, -1), (-4, -3), (1, i16::MIN), (1, i16::MAX)] {
+            assert_eq!(error(&mode(0x0700, (sync0, sync1))), ModeError::Sync1Cycle { factor: sync1 });
+        }
     }
 }
