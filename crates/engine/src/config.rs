@@ -41,7 +41,6 @@ pub use digest::{ConfigPart, Digest};
 pub(crate) use groups::can_be_head;
 pub use groups::{Group, groups};
 pub use ip::IpSettings;
-pub(crate) use pdo::{ASSIGNMENT_BASE, is_of_pdos};
 pub use pdo::{PdoAssignment, PdoEntry, PdoMapping};
 pub use refused_pdos::RefusedPdos;
 pub use register::{RegisterAccess, RegisterCommand};

@@ -8,6 +8,7 @@ use std::fmt;
 use ringcat_engine::config::{PdoMapping, SdoDownload, StartupAction, SubDeviceConfig};
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::plan;
+use ringcat_wire::mailbox::coe::pdo_objects::is_of_pdos;
 
 /// Lengths of a SyncManager in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,7 +97,7 @@ fn held_bytes(
 /// Whether a start-up command writes an assignment or a mapping.
 pub(super) fn writes_pdos(action: &StartupAction) -> bool {
     let StartupAction::Sdo(SdoDownload { index, .. }) = action else { return false };
-    matches!(index, 0x1600..=0x17FF | 0x1A00..=0x1BFF | 0x1C10..=0x1C2F)
+    is_of_pdos(*index)
 }
 
 /// All PDOs of a declaration, with their SyncManagers.

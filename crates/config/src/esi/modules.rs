@@ -1,5 +1,7 @@
 //! Modules in the slots of a device, and the indices of what they add (protocol ES-64 to ES-71).
 
+use ringcat_wire::mailbox::coe::pdo_objects::is_mapping;
+
 use super::error::EsiError;
 use super::model::{CoeCommand, Device, Esi, Module, Object, Pdo, Slot, SlotDistances, SlotIndex, Slots};
 use crate::xml::shown;
@@ -129,7 +131,7 @@ impl<'a> PlacedModule<'a> {
 
     /// An index of the module in its slot; `None` above 0xFFFF.
     pub fn index(&self, of: SlotIndex) -> Option<u16> {
-        let is_pdo = matches!(of.index, 0x1600..=0x17FF | 0x1A00..=0x1BFF);
+        let is_pdo = is_mapping(of.index);
         let distance =
             |pdo: Option<u16>, object: Option<u16>| u32::from(if is_pdo { pdo } else { object }.unwrap_or(0));
         let mut index = u32::from(of.index);

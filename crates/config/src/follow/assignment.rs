@@ -5,16 +5,12 @@ use std::collections::BTreeMap;
 
 use ringcat_engine::config::{PdoAssignment, PdoEntry, PdoMapping};
 use ringcat_engine::info::Direction;
+use ringcat_wire::mailbox::coe::pdo_objects::{ASSIGNMENT_BASE, RX_MAPPINGS, TX_MAPPINGS};
 
 use crate::eni::{CoeCommand, Pdo, SubDevice, Transition};
 
-/// PDO assignment of SyncManager n is 0x1C10 + n.
-const ASSIGNMENT: u16 = 0x1C10;
 /// SyncManagers with an assignment: 0 and 1 are mailboxes.
 const ASSIGNED: std::ops::RangeInclusive<u16> = 0x1C12..=0x1C1F;
-/// Mappings of outputs and of inputs.
-const OUTPUTS: std::ops::RangeInclusive<u16> = 0x1600..=0x17FF;
-const INPUTS: std::ops::RangeInclusive<u16> = 0x1A00..=0x1BFF;
 
 /// Maximum number of bits and entries of a PDO: data bytes of a datagram, subindices of an object.
 const PDO_BITS: u64 = 1486 * 8;
@@ -66,7 +62,7 @@ pub(super) fn of_commands(subdevice: &SubDevice, is_reversed: bool) -> Option<Ve
         for command in sent {
             let width = match command.index {
                 index if ASSIGNED.contains(&index) => 2,
-                index if OUTPUTS.contains(&index) || INPUTS.contains(&index) => 4,
+                index if RX_MAPPINGS.contains(&index) || TX_MAPPINGS.contains(&index) => 4,
                 _ => continue,
             };
             objects.entry(command.index).or_default().write(command, width);
@@ -79,7 +75,7 @@ pub(super) fn of_commands(subdevice: &SubDevice, is_reversed: bool) -> Option<Ve
             let pdos: Vec<u16> = object.list()?.into_iter().map(|pdo| pdo as u16).collect();
             let direction = direction(*index, &pdos)?;
             let pdos = pdos.into_iter().map(|pdo| mapping(pdo, &objects, subdevice)).collect();
-            Some(PdoAssignment::new((index - ASSIGNMENT) as u8, direction, pdos))
+            Some(PdoAssignment::new((index - ASSIGNMENT_BASE) as u8, direction, pdos))
         })
         .collect();
     (!assignments.is_empty()).then_some(assignments)
@@ -88,10 +84,10 @@ pub(super) fn of_commands(subdevice: &SubDevice, is_reversed: bool) -> Option<Ve
 /// The direction by the PDO numbers; without PDOs, by the usual direction of SyncManagers 2 and 3.
 fn direction(index: u16, pdos: &[u16]) -> Option<Direction> {
     match pdos.first() {
-        Some(pdo) if OUTPUTS.contains(pdo) => Some(Direction::Outputs),
-        Some(pdo) if INPUTS.contains(pdo) => Some(Direction::Inputs),
-        Some(_) | None if index == ASSIGNMENT + 2 => Some(Direction::Outputs),
-        Some(_) | None if index == ASSIGNMENT + 3 => Some(Direction::Inputs),
+        Some(pdo) if RX_MAPPINGS.contains(pdo) => Some(Direction::Outputs),
+        Some(pdo) if TX_MAPPINGS.contains(pdo) => Some(Direction::Inputs),
+        Some(_) | None if index == ASSIGNMENT_BASE + 2 => Some(Direction::Outputs),
+        Some(_) | None if index == ASSIGNMENT_BASE + 3 => Some(Direction::Inputs),
         Some(_) | None => None,
     }
 }

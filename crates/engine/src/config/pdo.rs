@@ -40,14 +40,6 @@ impl Hash for PdoMapping {
     }
 }
 
-/// Base of the PDO assignment objects: 0x1C10 + number of the SyncManager.
-pub(crate) const ASSIGNMENT_BASE: u16 = 0x1C10;
-
-/// Whether an object is the assignment of a SyncManager, or the mapping of a PDO (protocol 6.3).
-pub(crate) const fn is_of_pdos(index: u16) -> bool {
-    matches!(index, 0x1600..=0x17FF | 0x1A00..=0x1BFF | 0x1C10..=0x1C2F)
-}
-
 /// The PDOs of one SyncManager.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]

@@ -4,12 +4,13 @@
 use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
 
+use ringcat_wire::mailbox::coe::pdo_objects::ASSIGNMENT_BASE;
 use ringcat_wire::register::{SyncManager, SyncManagerControl, SyncManagerDirection, SyncManagerMode};
 use ringcat_wire::sii::{SiiSyncManager, SyncManagerKind};
 
 use super::error::PlanProblem;
 use super::subdevice::{AreaPlan, MappedEntry, MappedPdo, SmPlan};
-use crate::config::{ASSIGNMENT_BASE, PdoAssignment, PdoMapping, SubDeviceConfig, Watchdog};
+use crate::config::{PdoAssignment, PdoMapping, SubDeviceConfig, Watchdog};
 use crate::info::{Direction, PdoInfo, SubDeviceInfo};
 use crate::order::InOrder;
 

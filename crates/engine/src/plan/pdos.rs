@@ -2,10 +2,12 @@
 
 use alloc::vec::Vec;
 
+use ringcat_wire::mailbox::coe::pdo_objects::is_of_pdos;
+
 use super::error::PlanWarning;
 use super::sdos::{HeldPdos, PdoPlan};
 use super::subdevice::{AreaPlan, MappedPdo};
-use crate::config::{PdoAssignment, PdoEntry, PdoMapping, StartupAction, SubDeviceConfig, is_of_pdos};
+use crate::config::{PdoAssignment, PdoEntry, PdoMapping, StartupAction, SubDeviceConfig};
 use crate::info::SubDeviceInfo;
 
 /// The plans of all areas whose PDOs can be in a dictionary.

@@ -5,9 +5,10 @@
 
 use alloc::vec::Vec;
 
+use ringcat_wire::mailbox::coe::pdo_objects::ASSIGNMENT_BASE;
 use ringcat_wire::sii::CoeDetails;
 
-use crate::config::{ASSIGNMENT_BASE, PdoAssignment, PdoEntry, PdoMapping, SdoDownload};
+use crate::config::{PdoAssignment, PdoEntry, PdoMapping, SdoDownload};
 use crate::info::{PdoInfo, SubDeviceInfo};
 
 /// The PDOs of a SyncManager as they are to be in the dictionary of the SubDevice.

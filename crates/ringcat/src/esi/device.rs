@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use ringcat_config::esi::sii::{SiiOptions, SiiProfile, build, code_of};
 use ringcat_config::esi::{Device, Esi, Pdo, PlacedModule, SyncManagerRole, place_modules};
 use ringcat_sim::description::{DeviceDescription, PdoDescription, PdoEntryDescription};
+use ringcat_wire::mailbox::coe::pdo_objects::{RX_MAPPINGS, TX_MAPPINGS};
 use ringcat_wire::sii::{Pdo as SiiPdo, PdoDirection};
 
 use super::objects;
@@ -124,13 +125,13 @@ fn add_copies(device: &Device, description: &mut DeviceDescription) {
         let Some([default, _, most, distance]) = pdo.oversampling else { continue };
         let Some(own) = description.pdos.iter().find(|it| it.index == pdo.index.index).cloned() else { continue };
         let range = match own.direction {
-            PdoDirection::Rx => 0x1600..=0x17FF,
-            PdoDirection::Tx => 0x1A00..=0x1BFF,
+            PdoDirection::Rx => RX_MAPPINGS,
+            PdoDirection::Tx => TX_MAPPINGS,
         };
         let listed = of_modes.iter().filter(|(index, _)| *index == own.index).map(|(_, factor)| *factor);
         let count = listed.chain([default, most]).max().unwrap_or(1);
         let indices = (1..count).map_while(|copy| copy.checked_mul(distance)?.checked_add(own.index.into()));
-        let indices = indices.take_while(|index| range.contains(index)).filter_map(|index| u16::try_from(index).ok());
+        let indices = indices.map_while(|index| u16::try_from(index).ok().filter(|index| range.contains(index)));
         // With a distance of 0 the first copy has the index of the PDO itself; above 0 no index repeats.
         for index in indices.take_while(|index| *index != own.index) {
             if indices_used.insert(index) {

@@ -9,11 +9,12 @@ use ringcat_config::esi::{
 use ringcat_sim::application::dictionary::{Access, Entry, Object, ObjectRole};
 use ringcat_sim::description::{PdoDescription, data_type};
 use ringcat_wire::mailbox::coe::AccessRights;
+use ringcat_wire::mailbox::coe::pdo_objects::is_of_pdos;
 use ringcat_wire::sii::PdoDirection;
 
 /// Objects that the simulator creates: identity, SyncManager types, PDO assignments, mappings.
 fn is_derived(index: u16) -> bool {
-    matches!(index, 0x1018 | 0x1600..=0x17FF | 0x1A00..=0x1BFF | 0x1C00..=0x1C2F)
+    is_of_pdos(index) || matches!(index, 0x1018 | 0x1C00..=0x1C0F)
 }
 
 /// Configured and detected idents of modules.

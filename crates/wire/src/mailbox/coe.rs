@@ -1,12 +1,14 @@
 //! CoE: the two-byte header of every message (protocol 6.3).
 //!
 //! After the header: SDO transfers in [`super::sdo`], the [`Emergency`], SDO information in [`SdoInformation`] with its
-//! descriptions, or a PDO. Messages of the diagnosis history (object 0x10F3) are [`DiagnosisMessage`].
+//! descriptions, or a PDO; the objects that describe
+//! PDOs are in [`pdo_objects`]. Messages of the diagnosis history (object 0x10F3) are [`DiagnosisMessage`].
 
 mod description;
 mod diagnosis;
 mod emergency;
 mod information;
+pub mod pdo_objects;
 mod value;
 
 use core::fmt;

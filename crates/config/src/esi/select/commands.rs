@@ -3,6 +3,8 @@
 
 use std::collections::HashSet;
 
+use ringcat_wire::mailbox::coe::pdo_objects::is_of_pdos;
+
 use super::work::Work;
 use crate::esi::choices::Parameter;
 use crate::esi::error::EsiError;
@@ -58,10 +60,6 @@ pub(super) fn commands(work: &mut Work<'_>) -> Result<Vec<SelectedCommand>, EsiE
         commands.iter().any(|it| matches!(it.message, SelectedMessage::Sdo(index, ..) if is_of_pdos(index)));
     commands.iter_mut().for_each(|command| command.before_pdos |= before_pdos);
     Ok(commands)
-}
-
-const fn is_of_pdos(index: u16) -> bool {
-    matches!(index, 0x1600..=0x17FF | 0x1A00..=0x1BFF | 0x1C10..=0x1C2F)
 }
 
 fn add(commands: &mut Vec<SelectedCommand>, transitions: &[Transition], message: SelectedMessage, comment: &str) {

@@ -2,12 +2,11 @@
 
 use alloc::vec::Vec;
 
+use ringcat_wire::mailbox::coe::pdo_objects::ASSIGNMENT_BASE;
+
 use super::{SdoAddress, SdoError, read, write};
 use crate::config::{PdoEntry, PdoMapping};
 use crate::mail::{Limits, Mailbox};
-
-/// Index of the PDO assignment of SyncManager 0; that of SyncManager n is n higher.
-const ASSIGNMENT_BASE: u16 = 0x1C10;
 
 /// The PDOs assigned to a SyncManager, with their mapping.
 pub async fn read_assignment(mailbox: &Mailbox, sync_manager: u8, limits: Limits) -> Result<Vec<PdoMapping>, SdoError> {

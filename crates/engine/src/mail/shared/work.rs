@@ -5,10 +5,10 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use ringcat_wire::mailbox::Header;
+use ringcat_wire::mailbox::coe::pdo_objects::is_of_pdos;
 use ringcat_wire::mailbox::sdo::SdoRequest;
 
 use super::SharedMailbox;
-use crate::config::is_of_pdos;
 use crate::mail::error::MailboxError;
 use crate::mail::lane::{Lane, Outgoing};
 use crate::mail::{reader, writer};

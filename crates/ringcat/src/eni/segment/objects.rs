@@ -7,6 +7,7 @@ use ringcat_sim::application::dictionary::{ASSIGNMENT_BASE, Access, Entry, Objec
 use ringcat_sim::application::soe::idn::IdnObject;
 use ringcat_sim::description::{PdoDescription, SyncManagerDescription, data_type};
 use ringcat_wire::mailbox::coe::DataType;
+use ringcat_wire::mailbox::coe::pdo_objects::is_mapping;
 use ringcat_wire::mailbox::soe::Idn;
 use ringcat_wire::sii::{PdoDirection, SyncManagerKind};
 
@@ -96,7 +97,7 @@ fn is_created_here(index: u16, pdos: &[PdoDescription], declared: &[SyncManagerD
     let assignment = (ASSIGNMENT_BASE..ASSIGNMENT_BASE + 0x20).contains(&index);
     let of_sync_managers = index == 0x1C00 || (assignment && declared.get(number).is_some_and(exchanges));
     let standard = matches!(index, 0x1000 | 0x1001 | 0x1008..=0x100A | 0x1018);
-    let mapping = (0x1600..=0x17FF).contains(&index) || (0x1A00..=0x1BFF).contains(&index);
+    let mapping = is_mapping(index);
     let is_there = of_sync_managers || standard || (mapping && pdos.iter().any(|pdo| pdo.index == index));
     !is_there
 }

@@ -1,13 +1,11 @@
 //! Objects of descriptions and dictionaries: a name, rules, entries (protocol 6.3).
 
+pub use ringcat_wire::mailbox::coe::pdo_objects::ASSIGNMENT_BASE;
 use ringcat_wire::mailbox::coe::{DataType, ObjectCode};
 use ringcat_wire::sii::PdoDirection;
 
 use super::entry::{Access, Entry};
 use crate::data_type;
-
-/// Index of the PDO assignment of SyncManager 0; the index for SyncManager n is n higher.
-pub const ASSIGNMENT_BASE: u16 = 0x1C10;
 
 /// Maximum number of entries of a configurable mapping.
 pub(super) const MAX_MAPPED_ENTRIES: usize = 32;
