@@ -52,7 +52,7 @@ use crate::xml;
 /// # Errors
 /// [`EsiError`]: bytes that are not XML, files of another kind, values out of range, duplicates.
 pub fn read(name: &str, bytes: &[u8]) -> Result<Esi, EsiError> {
-    let (text, differs) = xml::decode_utf8_first(bytes).map_err(|error| EsiError::of_xml(name, error))?;
+    let (text, differs) = xml::decode_utf8_first(bytes).map_err(|error| EsiError::of_xml(name, error, bytes))?;
     let mut esi = parse::parse(name, &text)?;
     if differs {
         let text = "the declared encoding is not that of the bytes, which are UTF-8".to_owned();

@@ -4,7 +4,7 @@ use std::fmt;
 
 use roxmltree::Node;
 
-use crate::xml::shown;
+use crate::xml::{is_cipher, is_signature, packed, shown};
 
 /// The kind of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,32 +32,18 @@ pub enum FileKind {
 impl FileKind {
     /// The kind of a file that is not XML.
     pub(super) fn of_bytes(bytes: &[u8]) -> FileKind {
-        let known: [(&[u8], &'static str); 5] = [
-            (b"Salted__", "encrypted with a password (OpenSSL)"),
-            (b"-----BEGIN", "a PEM container"),
-            (&[0x30, 0x82], "a PKCS container"),
-            (b"PK\x03\x04", "a ZIP archive"),
-            (&[0x1F, 0x8B], "compressed with gzip"),
-        ];
-        let found = known.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|(_, what)| *what);
-        match found {
-            Some(what) => FileKind::Encrypted(what),
-            None if is_random(bytes) => FileKind::Encrypted("random bytes"),
-            None => FileKind::NotXml,
-        }
+        packed(bytes).map_or(FileKind::NotXml, FileKind::Encrypted)
     }
 
     /// The kind by the root element; `None` for an ENI.
     pub(super) fn of(root: Node<'_, '_>) -> Option<FileKind> {
         let name = root.tag_name().name();
-        let is_cipher = |node: &Node<'_, '_>| matches!(node.tag_name().name(), "EncryptedData" | "CipherData");
         // A part of a file may be encrypted, too.
-        if root.descendants().any(|node| is_cipher(&node)) {
+        if root.descendants().any(|node| is_cipher(node.tag_name().name())) {
             return Some(FileKind::Encrypted("XML encryption"));
         }
         // XML signatures: around the configuration, or in it (protocol ES-153).
-        let is_signature =
-            |node: Node<'_, '_>| node.is_element() && matches!(node.tag_name().name(), "Signature" | "SignedInfo");
+        let is_signature = |node: Node<'_, '_>| node.is_element() && is_signature(node.tag_name().name());
         if is_signature(root) {
             return Some(FileKind::Signed("around the configuration"));
         }
@@ -75,39 +61,6 @@ impl FileKind {
             other => Some(FileKind::OtherXml(other.to_owned())),
         }
     }
-}
-
-/// Whether the bytes have the entropy of random data, which text and tables do not reach.
-fn is_random(bytes: &[u8]) -> bool {
-    /// Number of bytes that are evaluated; fewer bytes are not significant.
-    const LOOKED_AT: std::ops::RangeInclusive<usize> = 256..=4096;
-    let bytes = &bytes[..bytes.len().min(*LOOKED_AT.end())];
-    let mut counts = [0_u32; 256];
-    bytes.iter().for_each(|byte| counts[usize::from(*byte)] += 1);
-    let total = bytes.len() as u64;
-    let all = counts.iter().map(|count| u64::from(*count)).filter(|count| *count > 0);
-    let bits = all.map(|count| count * log2(total, count)).sum::<u64>() as f64 / (total.max(1) << FRACTION) as f64;
-    // 256 random bytes have 7.2 bits each, text has less than 6.
-    LOOKED_AT.contains(&bytes.len()) && bits > 6.8
-}
-
-/// Fractional bits of [`log2`].
-const FRACTION: u32 = 16;
-
-/// The logarithm of a ratio of at least 1, by squaring: libm would have to be linked into programs in C for this alone.
-fn log2(total: u64, count: u64) -> u64 {
-    let ratio = (total << 32) / count;
-    let whole = ratio.ilog2();
-    // Between 1 and 2, with 31 fractional bits.
-    let mut mantissa = (ratio << (63 - whole)) >> 32;
-    let mut log = u64::from(whole.saturating_sub(32));
-    for _ in 0..FRACTION {
-        mantissa = (mantissa * mantissa) >> 31;
-        let is_two = mantissa >> 32;
-        mantissa >>= is_two;
-        log = log << 1 | is_two;
-    }
-    log
 }
 
 /// Whether a root `EtherCATConfig` names the schema of device descriptions.

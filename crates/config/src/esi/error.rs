@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::fmt;
 
-use crate::xml::{Place, XmlError, XmlProblem};
+use crate::xml::{Place, XmlError, XmlProblem, packed};
 
 /// Roots of files to which descriptions refer, and what they are.
 pub(super) const COMPANIONS: [(&str, &str); 2] = [
@@ -93,13 +93,16 @@ impl EsiError {
         matches!(&self.problem, EsiProblem::WrongFile { kind } if COMPANIONS.iter().any(|(_, it)| kind == it))
     }
 
-    /// An error about the bytes or the XML of a file.
-    pub(crate) fn of_xml(file: &str, error: XmlError) -> EsiError {
+    /// An error about the bytes or the XML of a file; files that are encrypted or packed are named as such.
+    pub(crate) fn of_xml(file: &str, error: XmlError, bytes: &[u8]) -> EsiError {
         let problem = match error.problem {
             XmlProblem::TooMuch { what, limit } => EsiProblem::TooMuch { what, limit },
             XmlProblem::Encoding { reason } => EsiProblem::Encoding { reason },
             XmlProblem::Syntax { reason } => EsiProblem::Xml { reason },
-            XmlProblem::NotXml => EsiProblem::WrongFile { kind: "no XML file".to_owned() },
+            XmlProblem::NotXml => {
+                let what = packed(bytes).map(|what| format!("an encrypted or packed file ({what})"));
+                EsiProblem::WrongFile { kind: what.unwrap_or_else(|| "no XML file".to_owned()) }
+            }
         };
         EsiError { place: error.place, ..EsiError::at_line(file, 0, "", problem) }
     }

@@ -21,7 +21,7 @@ use super::error::{COMPANIONS, EsiError, EsiProblem};
 use super::limits::{MAX_ATTRIBUTE_BYTES, MAX_DEVICES, MAX_TEXT_BYTES};
 use super::model::{Device, Dictionary, Esi, Group, Reference, Vendor};
 use super::schema;
-use crate::xml::{self, shown};
+use crate::xml::{self, is_cipher, is_signature, shown};
 
 /// The model of a file with devices (root `EtherCATInfo`) or modules (root `EtherCATModule`).
 pub(super) fn parse(name: &str, text: &str) -> Result<Esi, EsiError> {
@@ -50,7 +50,7 @@ pub(super) fn dictionary(name: &str, text: &str) -> Result<Dictionary, EsiError>
 }
 
 fn document<'a>(name: &str, text: &'a str) -> Result<Document<'a>, EsiError> {
-    let of_xml = |error| EsiError::of_xml(name, error);
+    let of_xml = |error| EsiError::of_xml(name, error, text.as_bytes());
     xml::check(text).map_err(of_xml)?;
     let document = xml::parse(text).map_err(of_xml)?;
     let too_long = |node: &Node<'_, '_>| match node.text() {
@@ -71,8 +71,6 @@ fn document<'a>(name: &str, text: &'a str) -> Result<Document<'a>, EsiError> {
 
 /// What elements of encryption, at any level, or of a signature make of a file (protocol ES-153).
 fn protection(root: Element<'_>) -> Option<&'static str> {
-    let is_cipher = |name: &str| matches!(name, "EncryptedData" | "EncryptedKey" | "CipherData");
-    let is_signature = |name: &str| matches!(name, "Signature" | "SignedInfo");
     if root.names_below().any(is_cipher) {
         return Some("an encrypted file (XML encryption)");
     }

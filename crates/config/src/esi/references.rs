@@ -167,7 +167,7 @@ impl Files<'_> {
 }
 
 fn dictionary(path: &str, bytes: &[u8]) -> Result<Dictionary, EsiError> {
-    let (text, _) = xml::decode_utf8_first(bytes).map_err(|error| EsiError::of_xml(path, error))?;
+    let (text, _) = xml::decode_utf8_first(bytes).map_err(|error| EsiError::of_xml(path, error, bytes))?;
     parse::dictionary(path, &text)
 }
 

@@ -21,7 +21,10 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Cow<'_, str>, XmlError> {
     }
     let (encoding, mark) = match Encoding::for_bom(bytes) {
         Some(found) => found,
-        None => (without_mark(bytes)?, 0),
+        None => {
+            ascii_only(bytes)?;
+            (without_mark(bytes)?, 0)
+        }
     };
     match encoding.decode_without_bom_handling_and_without_replacement(&bytes[mark..]) {
         Some(text) => Ok(text),
@@ -42,6 +45,31 @@ pub(crate) fn decode_utf8_first(bytes: &[u8]) -> Result<(Cow<'_, str>, bool), Xm
         return Ok((Cow::Borrowed(text), true));
     }
     decode(bytes).map(|text| (text, false))
+}
+
+/// A file that declares US-ASCII has no other bytes: decoders take the name for that of windows-1252.
+fn ascii_only(bytes: &[u8]) -> Result<(), XmlError> {
+    let Some(at) = bytes.iter().position(|byte| !byte.is_ascii()) else { return Ok(()) };
+    let is_declared = declared(bytes).is_some_and(|label| {
+        ["us-ascii", "ascii", "iso646-us", "ansi_x3.4-1968"].iter().any(|name| label.eq_ignore_ascii_case(name))
+    });
+    if !is_declared {
+        return Ok(());
+    }
+    let byte = bytes[at];
+    let reason = format!(
+        "the byte {byte:#04x} is not in US-ASCII, which the file declares: save the file as UTF-8, or declare the \
+         encoding that it has (windows-1252?)"
+    );
+    Err(XmlError::at(place(bytes, at), XmlProblem::Encoding { reason }))
+}
+
+/// Line and column of a byte; the line before it is UTF-8.
+fn place(bytes: &[u8], at: usize) -> Place {
+    let line = bytes[..at].iter().filter(|byte| **byte == b'\n').count() + 1;
+    let begin = bytes[..at].iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
+    let column = String::from_utf8_lossy(&bytes[begin..at]).chars().count() + 1;
+    Place { line: line as u32, column: column as u32 }
 }
 
 /// The encoding of a file without byte order mark.
@@ -85,8 +113,5 @@ fn not_in(encoding: &'static Encoding, bytes: &[u8]) -> XmlError {
         return XmlError::of_file(problem);
     }
     let valid = std::str::from_utf8(bytes).err().map_or(0, |error| error.valid_up_to());
-    let line = bytes[..valid].iter().filter(|byte| **byte == b'\n').count() + 1;
-    let begin = bytes[..valid].iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
-    let column = String::from_utf8_lossy(&bytes[begin..valid]).chars().count() + 1;
-    XmlError::at(Place { line: line as u32, column: column as u32 }, problem)
+    XmlError::at(place(bytes, valid), problem)
 }

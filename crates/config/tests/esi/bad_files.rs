@@ -56,6 +56,9 @@ fn wrong_encodings_and_other_files_are_named() {
     bytes[600] = 0xFF;
     assert!(refusal(&bytes).contains("the bytes are not in UTF-8"));
     assert!(refusal(ACME.replacen("UTF-8", "klingon", 1)).contains("encoding"));
+    let mut ascii = ACME.replacen("UTF-8", "US-ASCII", 1).into_bytes();
+    ascii[600] = 0xFF;
+    assert!(refusal(&ascii).contains("the byte 0xff is not in US-ASCII, which the file declares"));
     for (text, kind) in [
         ("", "no XML file"),
         ("\u{7f}ELF", "no XML file"),
@@ -81,6 +84,11 @@ fn values_out_of_range_and_duplicates_name_line_and_device() {
             "device \"AD08\": Device/Eeprom/ByteSize: expected 1 to 8388608 bytes",
         ),
         ("<BitLen>4</BitLen>", "<BitLen>70000</BitLen>", "Device/RxPdo/Entry/BitLen: expected a number of 16 bits"),
+        (
+            "<ByteSize>512</ByteSize>",
+            "<ByteSize>512</ByteSize><Category><CatNo>65535</CatNo><Data>01</Data></Category>",
+            "Device/Eeprom/Category/CatNo: expected a category: 65535 is the end of an EEPROM, got 65535",
+        ),
         ("<ConfigData>0401", "<ConfigData>401", "expected bytes as pairs of hexadecimal digits"),
         ("<Elements>3<", "<Elements>4000000000<", "more than 65536 elements of an array"),
         ("<Transition>PS<", "<Transition>XY<", "expected a transition IP, PS, SO, SP, OP or OS, got \"XY\""),
@@ -135,8 +143,14 @@ fn encrypted_and_signed_files_are_named() {
         ("<ds:Signature xmlns:ds=\"http://www.w3.org/2000/09/xmldsig#\"/>", "a signed file"),
         ("<EtherCATInfo><Signature/></EtherCATInfo>", "a signed file"),
         ("<EtherCATInfo><Vendor><EncryptedData/></Vendor></EtherCATInfo>", "an encrypted file"),
+        ("<EtherCATInfo><Vendor><EncryptedKey/></Vendor></EtherCATInfo>", "an encrypted file"),
+        ("PK\u{3}\u{4}\u{14}", "an encrypted or packed file (a ZIP archive)"),
+        ("-----BEGIN CMS-----", "an encrypted or packed file (a PEM container)"),
     ] {
         let error = refusal(text);
         assert!(error.contains(kind), "{error}");
     }
+    let gzip = [0x1F, 0x8B, 8, 0, 0xFF];
+    let error = esi::read("packed.xml", &gzip).expect_err("it is no XML").to_string();
+    assert!(error.contains("an encrypted or packed file (compressed with gzip)"), "{error}");
 }

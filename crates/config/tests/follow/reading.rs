@@ -70,6 +70,15 @@ fn bytes_that_are_not_in_the_encoding_are_refused_with_their_line() {
     assert_eq!(error.place.map(|place| place.line), Some(line));
     assert!(error.to_string().contains("not in UTF-8"), "{error}");
     assert!(refusal(&SMALL.replace("UTF-8", "klingon")).contains("\"klingon\" is not known"));
+    // The reader of one-byte encodings would take it for windows-1252.
+    let ascii = String::from_utf8_lossy(&bytes).replace("UTF-8", "US-ASCII");
+    let at = ascii.find('\u{fffd}').expect("the wrong byte");
+    let mut ascii = ascii.replace('\u{fffd}', "L").into_bytes();
+    assert!(eni::read(&ascii).is_ok(), "without other bytes");
+    ascii[at] = 0xFC;
+    let error = eni::read(&ascii).unwrap_err();
+    assert_eq!(error.place.map(|place| place.line), Some(line));
+    assert!(error.to_string().contains("the byte 0xfc is not in US-ASCII, which the file declares"), "{error}");
 }
 
 // covers: eni-read
@@ -226,8 +235,10 @@ fn an_encrypted_file_is_refused_with_the_tool_that_writes_such_files() {
         <EncryptedData xmlns="http://www.w3.org/2001/04/xmlenc#"><CipherData/></EncryptedData>"#;
     let salted = [&b"Salted__"[..], &random].concat();
     let part = SMALL.replacen("<Slave>", "<Slave><EncryptedData><CipherData/></EncryptedData>", 1);
+    let key = SMALL.replacen("<Slave>", "<Slave><EncryptedKey/>", 1);
     for (bytes, what) in [
         (part.as_bytes(), "XML encryption"),
+        (key.as_bytes(), "XML encryption"),
         (&random[..], "random bytes"),
         (&salted[..], "encrypted with a password (OpenSSL)"),
         (&xml[..], "XML encryption"),

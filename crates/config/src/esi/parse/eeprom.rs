@@ -4,6 +4,8 @@ use crate::esi::element::Element;
 use crate::esi::error::{EsiError, EsiProblem};
 use crate::esi::model::{Eeprom, EepromCategory, EepromContent};
 
+/// The number behind the last category.
+const CATEGORY_END: u16 = 0xFFFF;
 /// Largest EEPROM: the size word counts units of 128 bytes.
 const MAX_BYTES: u32 = 0x1_0000 * 128;
 
@@ -26,7 +28,11 @@ pub(super) fn eeprom(element: Element<'_>) -> Result<Eeprom, EsiError> {
 }
 
 fn category(element: Element<'_>) -> Result<EepromCategory, EsiError> {
-    let number = element.required_number("CatNo")?;
+    let number: u16 = element.required_number("CatNo")?;
+    if number == CATEGORY_END {
+        let expected = format!("a category: {CATEGORY_END} is the end of an EEPROM");
+        return Err(element.required("CatNo")?.error(EsiProblem::Value { expected, got: number.to_string() }));
+    }
     let content = if let Some(data) = element.hex_of("Data")? {
         EepromContent::Data(data)
     } else if let Some(text) = element.child("DataString") {
