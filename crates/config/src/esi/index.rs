@@ -1,9 +1,9 @@
 //! An index over device descriptions: which file describes a device, without reading the files again (protocol ES-25,
 //! ES-29, ES-30).
 //!
-//! Input: descriptions that were read once, with size and time of their files and of those to which they refer. Output:
-//! choices by identity, lists of devices, and a text to keep. A text of another version, or a damaged one, is no index:
-//! the caller reads the files again. The caller opens files; nothing here does.
+//! Input: descriptions that were read once, with size and time of their files and of those to which they refer.
+//! Output: choices by identity, lists of devices, and a text to keep. A text of another version, or with a wrong
+//! checksum, is no index: the caller reads the files again. The caller opens files; nothing here does.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write as _;
@@ -12,7 +12,9 @@ use super::model::Esi;
 use super::rules::{Choice, choose};
 
 /// First line of the text.
-const HEAD: &str = "RingCAT index of device descriptions 2";
+const HEAD: &str = "RingCAT index of device descriptions 3";
+/// Begin of the last line.
+const END: &str = "end\t";
 /// Most characters of a text in the index.
 const MAX_TEXT: usize = 200;
 
@@ -226,18 +228,18 @@ impl Index {
                 }
             }
         }
-        text.push_str("end\n");
-        text
+        with_end(text)
     }
 
     /// The index of a kept text; `None` if it is damaged or of another version.
     pub fn from_text(text: &str) -> Option<Index> {
+        let (text, _) = text.rsplit_once(END).filter(|(body, _)| with_end((*body).to_owned()) == text)?;
         let mut lines = text.lines();
         if lines.next() != Some(HEAD) {
             return None;
         }
         let mut files: Vec<IndexedFile> = Vec::new();
-        for line in lines.by_ref() {
+        for line in lines {
             let (kind, rest) = line.split_once('\t').unwrap_or((line, ""));
             match kind {
                 "file" => files.push(file_line(rest)?),
@@ -253,12 +255,20 @@ impl Index {
                     let hidden = (product.parse().ok()?, revision.parse().ok()?);
                     files.last_mut()?.devices.last_mut()?.hides.push(hidden);
                 }
-                "end" => return lines.next().is_none().then(|| Index::new(files)),
                 _ => return None,
             }
         }
-        None
+        Some(Index::new(files))
     }
+}
+
+/// A text with its last line: the checksum of all lines before it (FNV-1a).
+fn with_end(mut text: String) -> String {
+    let step = |sum: u64, byte: &u8| (sum ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01B3);
+    let sum = text.as_bytes().iter().fold(0xCBF2_9CE4_8422_2325, step);
+    // Writing into a String cannot fail.
+    let _ = writeln!(text, "{END}{sum:016x}");
+    text
 }
 
 fn file_line(rest: &str) -> Option<IndexedFile> {
@@ -380,8 +390,14 @@ mod tests {
         for end in (0..text.len() - 1).filter(|end| text.is_char_boundary(*end)) {
             assert_eq!(Index::from_text(&text[..end]), None, "cut at {end}");
         }
-        for wrong in ["device\t1\t2\n", "hides\t1\t2\nend\n", "file\tx\t1\ta.xml\nend\n", "other\nend\n"] {
-            assert_eq!(Index::from_text(&format!("{HEAD}\n{wrong}")), None, "{wrong}");
+        for wrong in ["device\t1\t2\n", "hides\t1\t2\n", "file\tx\t1\ta.xml\n", "other\n"] {
+            assert_eq!(Index::from_text(&with_end(format!("{HEAD}\n{wrong}"))), None, "{wrong}");
+        }
+        for (at, _) in text.match_indices(|c: char| c.is_ascii_digit()) {
+            let mut changed = text.clone().into_bytes();
+            changed[at] ^= 1;
+            let changed = String::from_utf8(changed).expect("a digit is another digit");
+            assert_eq!(Index::from_text(&changed), None, "a wrong digit at {at}");
         }
     }
 }
