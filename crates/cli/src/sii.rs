@@ -15,7 +15,7 @@ use crate::esi::device::{DeviceArguments, read};
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::sii::{ComparedImage, Difference, SiiBuilt, SiiCompared, SiiSkeleton};
-use crate::numbers::number_of_32_bits;
+use crate::numbers::{number_of_16_bits, number_of_32_bits};
 use crate::output::{counted, say, warn};
 use crate::verdict::{Report, Verdict};
 
@@ -62,7 +62,7 @@ struct BuildArguments {
     #[arg(long, value_name = "LCID", default_value_t = 1033, help_heading = "Image")]
     language: u32,
     /// Station alias
-    #[arg(long, value_name = "ALIAS", help_heading = "Image")]
+    #[arg(long, value_name = "ALIAS", value_parser = number_of_16_bits, help_heading = "Image")]
     alias: Option<u16>,
     /// Serial number
     #[arg(long, value_name = "SERIAL", value_parser = number_of_32_bits, help_heading = "Image")]

@@ -2,6 +2,7 @@
 //! with names and types, SYNC signals, time limits, watchdogs, start-up commands (protocol ES-26, ES-33, ES-40 to
 //! ES-67).
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use ringcat_engine::config::MailMessage;
@@ -15,8 +16,8 @@ use super::model::{
 use super::unique::Names;
 use super::values::{Bytes, Shift, Time};
 use crate::esi::{
-    self, Device, EsiError, OpMode, RevisionCheck, SelectedCommand, SelectedMessage, SelectedSyncManager, Selection,
-    SyncManagerRole, Transition,
+    self, Device, EsiError, OpMode, PlacedModule, RevisionCheck, SelectedCommand, SelectedMessage, SelectedSyncManager,
+    Selection, SyncManagerRole, Transition,
 };
 use crate::ip;
 
@@ -62,8 +63,9 @@ impl SubDevice {
         };
         let described =
             |of: &SelectedSyncManager<'_>| !of.pdos.is_empty() || of.definition.default_size.unwrap_or(0) == 0;
-        subdevice.sync_manager =
-            selection.sync_managers.iter().filter(|of| described(of)).map(|of| sync_manager(of, language)).collect();
+        let of = selection.sync_managers.iter().filter(|of| described(of));
+        let modules = pdos_of_modules(&selection.modules);
+        subdevice.sync_manager = of.map(|of| sync_manager(of, &modules, language)).collect();
         if let Some(mode) = selection.mode {
             if device.clock.as_ref().is_some_and(|clock| clock.time_loop_only) {
                 from.note("TimeLoopControlOnly: SYNC and LATCH units are not activated".into());
@@ -212,22 +214,36 @@ fn timeouts(device: &Device) -> Timeouts {
     }
 }
 
-fn sync_manager(of: &SelectedSyncManager<'_>, language: u32) -> SyncManager {
+/// The modules by the PDOs that they have in their slots.
+fn pdos_of_modules<'a>(modules: &'a [PlacedModule<'a>]) -> BTreeMap<u16, &'a PlacedModule<'a>> {
+    let pdos = modules.iter().flat_map(|placed| {
+        let own = placed.module.rx_pdos.iter().chain(&placed.module.tx_pdos);
+        own.filter_map(move |pdo| Some((placed.index(pdo.index)?, placed)))
+    });
+    pdos.collect()
+}
+
+fn sync_manager(
+    of: &SelectedSyncManager<'_>,
+    modules: &BTreeMap<u16, &PlacedModule<'_>>,
+    language: u32,
+) -> SyncManager {
     SyncManager {
         number: of.number,
         direction: if of.outputs { model::Direction::Outputs } else { model::Direction::Inputs },
         start: of.definition.start,
         control: of.definition.control,
         op_only: of.definition.op_only,
-        pdo: of.pdos.iter().map(|of| pdo(of, language)).collect(),
+        pdo: of.pdos.iter().map(|of| pdo(of, modules, language)).collect(),
         ..SyncManager::default()
     }
 }
 
-fn pdo(of: &esi::Pdo, language: u32) -> Pdo {
+fn pdo(of: &esi::Pdo, modules: &BTreeMap<u16, &PlacedModule<'_>>, language: u32) -> Pdo {
+    let of_module = modules.get(&of.index.index).map(|placed| placed.pdo_name(of, language));
     Pdo {
         index: of.index.index,
-        name: printable(of.name.in_language(language)),
+        name: printable(of_module.as_deref().unwrap_or_else(|| of.name.in_language(language))),
         fixed: of.is_fixed,
         entries: Some(
             of.entries.iter().filter(|entry| entry.bit_length > 0).flat_map(|of| entry(of, language)).collect(),

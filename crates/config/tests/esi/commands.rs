@@ -143,10 +143,10 @@ fn modules_are_before_the_pdos_and_start_up_commands_after_them() {
     };
     let (mut file, _) = network(&with_commands(&command("#x2000"), ""), DRIVE);
     assert_eq!(declared(&file), [(0xF030, false), (0x2000, true), (0x6060, true)]);
-    assert_eq!(exported(&file), [0xF030, 0x1C12, 0x1C13, 0x2000, 0x6060]);
+    assert_eq!(exported(&file), [0xF030, 0x1C12, 0x1C13, 0x1C12, 0x1C13, 0x2000, 0x6060]);
     // What is written in the file stays where the file says.
     file.subdevice[0].startup[0..].iter_mut().for_each(|it| it.after_pdos = !it.after_pdos);
-    assert_eq!(exported(&file), [0x2000, 0x6060, 0x1C12, 0x1C13, 0xF030]);
+    assert_eq!(exported(&file), [0x2000, 0x6060, 0x1C12, 0x1C13, 0x1C12, 0x1C13, 0xF030]);
     // A description that assigns the PDOs itself is corrected by the engine.
     let (file, _) = network(&with_commands(&(command("#x2000") + &command("#x1C12")), ""), DRIVE);
     assert_eq!(declared(&file), [(0xF030, false), (0x2000, false), (0x1C12, false), (0x6060, false)]);
@@ -171,6 +171,29 @@ fn the_mapping_of_a_fixed_pdo_is_not_written() {
     assert_eq!(exported(&file), [0x1C13, 0x1A02, 0x1C13, 0x8000]);
 }
 
+/// As EC-Engineer writes them: a PDO that passes from one SyncManager to another is in neither meanwhile.
+// covers: eni-run, ES-125, ES-182
+#[test]
+fn all_assignments_are_cleared_before_mappings_and_inputs_are_mapped_first() {
+    let (mut file, _) = network(ACME, DRIVE);
+    file.subdevice[0].mailbox.as_mut().expect("CoE").pdo_config = true;
+    file.subdevice[0].sync_manager.iter_mut().flat_map(|it| &mut it.pdo).for_each(|pdo| pdo.fixed = false);
+    assert_eq!(exported(&file), [0xF030, 0x1C12, 0x1C13, 0x1A00, 0x1600, 0x1C12, 0x1C13, 0x6060]);
+}
+
+// covers: esi-declare
+#[test]
+fn a_pdo_of_a_module_has_the_module_in_its_name() {
+    let esi = acme_of(ACME);
+    let mut choices = Choices::default();
+    choices.modules = ["csp axis", "status axis"].map(|it| Some(it.to_owned())).into();
+    let selection = select(&esi, &esi.devices[DRIVE], &choices).unwrap_or_else(|error| panic!("{error}"));
+    let from = SubDevice::from_esi(&selection, CYCLE, 1033).unwrap_or_else(|error| panic!("{error}"));
+    let pdos = from.subdevice.sync_manager.iter().flat_map(|it| &it.pdo);
+    let names: Vec<(u16, &str)> = pdos.map(|pdo| (pdo.index, pdo.name.as_str())).collect();
+    assert_eq!(names, [(0x1600, "csp axis/Outputs"), (0x1A00, "csp axis/Inputs"), (0x1A10, "status axis/Inputs")]);
+}
+
 // covers: eni-run, ES-125
 #[test]
 fn an_order_of_commands_that_an_eni_cannot_have_is_named() {
@@ -178,7 +201,7 @@ fn an_order_of_commands_that_an_eni_cannot_have_is_named() {
     let idents = file.subdevice[0].startup.len();
     let ip = Startup { ip: Some(Ip { name: Some("drive".to_owned()), ..Ip::default() }), ..Startup::default() };
     file.subdevice[0].startup.push(ip);
-    assert_eq!(exported(&file), [0xF030, 0x1C12, 0x1C13, 0x6060]);
+    assert_eq!(exported(&file), [0xF030, 0x1C12, 0x1C13, 0x1C12, 0x1C13, 0x6060]);
     let left_out = file.to_eni(&ExportOptions::default()).map(|export| export.left_out).unwrap_or_default();
     assert!(left_out.iter().any(|it| it.what.contains("order of the start-up commands")), "{left_out:?}");
     file.subdevice[0].startup[idents].after_pdos = true;

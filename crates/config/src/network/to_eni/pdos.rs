@@ -2,12 +2,10 @@
 //! where the dictionary holds others.
 
 use ringcat_engine::config::{SdoDownload, StartupAction, StartupCommand, Transition};
+use ringcat_wire::mailbox::coe::pdo_objects::{ASSIGNMENT_BASE, is_of_pdos};
 
 use crate::export::is_expressible;
-use crate::network::model::{Pdo, Protocol, SubDevice};
-
-/// PDO assignment of SyncManager n.
-const ASSIGNMENT: u16 = 0x1C10;
+use crate::network::model::{Direction, Pdo, Protocol, SubDevice, SyncManager};
 
 /// Puts them after the start-up commands of the file without `after_pdos` and before the others, as the engine sends
 /// them, unless the file has such commands itself. If an ENI cannot have this order, they directly follow the other
@@ -42,32 +40,36 @@ fn commands(startup: &[StartupCommand], of: &SubDevice) -> Vec<StartupCommand> {
         return Vec::new();
     };
     let is_own = |command: &StartupCommand| match &command.action {
-        StartupAction::Sdo(download) => {
-            matches!(download.index, 0x1600..=0x17FF | 0x1A00..=0x1BFF | 0x1C10..=0x1C2F)
-        }
+        StartupAction::Sdo(download) => is_of_pdos(download.index),
         _ => false,
     };
     if startup.iter().any(is_own) {
         return Vec::new();
     }
-    let mut commands = Vec::new();
-    for it in of.sync_manager.iter().filter(|it| !it.pdo.is_empty()) {
-        let object = ASSIGNMENT + u16::from(it.number);
-        if mailbox.pdo_assign {
-            commands.push(download(object, 0, [0], format!("clear sm pdos ({object:#06x})")));
+    // The mapping of an assigned PDO cannot be changed.
+    if !mailbox.pdo_assign {
+        return Vec::new();
+    }
+    let assigned: Vec<(u16, &SyncManager)> = of
+        .sync_manager
+        .iter()
+        .filter(|it| !it.pdo.is_empty())
+        .map(|it| (ASSIGNMENT_BASE + u16::from(it.number), it))
+        .collect();
+    let clear = |(object, _): &(u16, &SyncManager)| download(*object, 0, [0], format!("clear sm pdos ({object:#06x})"));
+    let mut commands: Vec<StartupCommand> = assigned.iter().map(clear).collect();
+    // No PDO is assigned any more, so one may pass from a SyncManager to another. Other tools map inputs first, too.
+    for direction in [Direction::Inputs, Direction::Outputs].into_iter().filter(|_| mailbox.pdo_config) {
+        let own = assigned.iter().filter(|(_, it)| it.direction == direction);
+        own.flat_map(|(_, it)| &it.pdo).filter(|pdo| !pdo.fixed).for_each(|pdo| map(pdo, &mut commands));
+    }
+    for (object, it) in assigned {
+        for (sub, pdo) in (1..=u8::MAX).zip(&it.pdo) {
+            let comment = format!("assign pdo {:#06x}", pdo.index);
+            commands.push(download(object, sub, pdo.index.to_le_bytes(), comment));
         }
-        // The mapping of an assigned PDO cannot be changed.
-        if mailbox.pdo_assign && mailbox.pdo_config {
-            it.pdo.iter().filter(|pdo| !pdo.fixed).for_each(|pdo| map(pdo, &mut commands));
-        }
-        if mailbox.pdo_assign {
-            for (sub, pdo) in (1..=u8::MAX).zip(&it.pdo) {
-                let comment = format!("assign pdo {:#06x}", pdo.index);
-                commands.push(download(object, sub, pdo.index.to_le_bytes(), comment));
-            }
-            let count = u8::try_from(it.pdo.len()).unwrap_or(u8::MAX);
-            commands.push(download(object, 0, [count], format!("set count of sm pdos ({object:#06x})")));
-        }
+        let count = u8::try_from(it.pdo.len()).unwrap_or(u8::MAX);
+        commands.push(download(object, 0, [count], format!("set count of sm pdos ({object:#06x})")));
     }
     commands
 }
