@@ -123,11 +123,8 @@ fn pdos_that_no_eeprom_lists_are_found_in_linear_time() {
     let mut found = bus(&(0..count).collect::<Vec<_>>());
     let mut file = file_of(&found);
     for (at, subdevice) in file.subdevice.iter_mut().enumerate() {
-        let mut pdo = Pdo::default();
-        pdo.index = 0x1A00 + (at % 512) as u16;
-        let mut sync_manager = SyncManager::default();
-        sync_manager.pdo.push(pdo);
-        subdevice.sync_manager.push(sync_manager);
+        let pdo = vec![Pdo { index: 0x1A00 + (at % 512) as u16, ..Pdo::default() }];
+        subdevice.sync_manager.push(SyncManager { pdo, ..SyncManager::default() });
     }
     let configuration = file.configuration();
     let begin = Instant::now();
