@@ -40,7 +40,7 @@ const EVALUATIONS: [&str; 3] = ["segment/attention.rs", "segment/idle.rs", "segm
 const TABLE: &str = "<!-- pauses for another part of the engine -->";
 
 /// By file or directory, each pause in its order.
-const WAITS: [(&str, &[Reason]); 42] = [
+const WAITS: [(&str, &[Reason]); 43] = [
     ("mail/foe.rs", &[Retry]),
     ("mail/reader.rs", &[Register]),
     ("mail/voe.rs", &[Register]),
@@ -80,6 +80,7 @@ const WAITS: [(&str, &[Reason]); 42] = [
     ("procedures/unassigned/quiet.rs", &[Register]),
     ("procedures/unassigned/rescan.rs", &[Retry, Retry]),
     ("procedures/undeclared/bring.rs", &[Register, Retry, Cyclic, Cyclic]),
+    ("procedures/undeclared/dictionaries.rs", &[Settle]),
     ("procedures/undeclared/mail.rs", &[Cyclic]),
     ("procedures/verify.rs", &[Cyclic]),
     ("supervisor", &[Settle, Pace]),

@@ -45,6 +45,7 @@ impl MainDevice {
             offered: view.last_offered(),
             activations: self.activations,
             siis: self.cache.known(),
+            dictionaries: self.segment.dictionaries.known(),
             clocks: view.known_clocks().map(|known| (*known).clone()),
         })
     }
@@ -95,12 +96,13 @@ impl MainDevice {
             return Err(ActivateError::Scanning);
         }
         let Knowledge { subdevices, others, topology, main_count, ring, .. } = knowledge;
-        let Knowledge { sequence, offered, activations, siis, clocks, .. } = knowledge;
+        let Knowledge { sequence, offered, activations, siis, dictionaries, clocks, .. } = knowledge;
         self.supervisor.assume_ring(ring);
         self.segment.observe(Observation::ScanBegun);
         *self.scan_error.borrow_mut() = None;
         self.emergencies.borrow_mut().forget_positions();
         self.cache.learn(siis);
+        self.segment.dictionaries.learn(dictionaries);
         if let Some(known) = clocks {
             self.segment.observe_clocks(ClockObservation::Known(Rc::new(known)));
         }

@@ -81,6 +81,8 @@ pub enum Watch {
     Undeclared,
     /// Reads the mail status of undeclared SubDevices.
     UndeclaredMail,
+    /// Without an application: reads object dictionaries.
+    Dictionaries,
 }
 
 /// A procedure on the bus. It returns its result as an observation.

@@ -53,6 +53,9 @@ impl Segment {
                 for watch in [Watch::Undeclared, Watch::UndeclaredMail, Watch::Idle] {
                     effects.start(Task::Watch(watch));
                 }
+                if self.choices.dictionaries {
+                    effects.start(Task::Watch(Watch::Dictionaries));
+                }
             }
             IdleObservation::Watched(carriers, state) => {
                 self.idle = self.idle.renewed();
