@@ -12,6 +12,7 @@ use super::activate_error::ActivateError;
 use crate::info::{PdoSource, SubDeviceInfo};
 use crate::knowledge::{Handover, Knowledge, KnownMailbox, KnownProgress, KnownSubDevice};
 use crate::procedures::resume::{Before, Known, resume};
+use crate::procedures::scan::unless_another;
 use crate::ring::Sequence;
 use crate::role::Function;
 use crate::segment::clocks::ClockObservation;
@@ -116,8 +117,10 @@ impl MainDevice {
         let before = Before { all, found, handover };
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.scan_error.clone());
         let options = self.own_scan_options();
+        let number = self.segment.view().scan_number();
         self.supervisor.spawn(async move {
-            if let Err(error) = resume(&bus, &segment, &options, before).await {
+            let resumed = unless_another(&segment, number, resume(&bus, &segment, &options, before)).await;
+            if let Some(Err(error)) = resumed {
                 let reason = slot.borrow_mut().insert(error).to_string();
                 segment.observe(Observation::ScanEnded(Err(reason)));
             }

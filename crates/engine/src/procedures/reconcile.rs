@@ -56,7 +56,9 @@ pub(crate) async fn reconcile(bus: Bus, segment: SharedSegment, companions: Comp
             Task::BringUndeclared { key, attempt } => bus.spawn(bring_undeclared(own_bus, own, (key, attempt))),
             Task::ReadPdos { key, attempt } => bus.spawn(read_pdos(own_bus, own, (key, attempt))),
             Task::KeepOutputs { key, attempt } => bus.spawn(keep_outputs(own_bus, own, (key, attempt))),
-            Task::ScanSegment => bus.spawn(scan_segment(own_bus, own, companions.options.clone())),
+            Task::ScanSegment { number } => {
+                bus.spawn(scan_segment(own_bus, own, companions.options.clone(), number));
+            }
             Task::FollowChange(change) => {
                 bus.spawn(follow_change(own_bus, own, companions.options.clone(), change));
             }

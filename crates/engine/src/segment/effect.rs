@@ -156,7 +156,10 @@ pub enum Task {
         attempt: u32,
     },
     /// Scans the segment without an application for the first time.
-    ScanSegment,
+    ScanSegment {
+        /// Its number.
+        number: u32,
+    },
     /// Scans it again after a change, or on request.
     FollowChange(Change),
     /// Reads the states of all SubDevices that are kept in their states.

@@ -116,7 +116,8 @@ impl Segment {
         let Some(scanned) = self.found().map(|found| found.counts()) else {
             if shown.has_answer() {
                 self.begin_scan(false);
-                self.begin_work((Work::FirstScan, Task::ScanSegment), effects);
+                let number = self.scan_number();
+                self.begin_work((Work::FirstScan, Task::ScanSegment { number }), effects);
             }
             return;
         };
