@@ -40,7 +40,7 @@ const EVALUATIONS: [&str; 3] = ["segment/attention.rs", "segment/idle.rs", "segm
 const TABLE: &str = "<!-- pauses for another part of the engine -->";
 
 /// By file or directory, each pause in its order.
-const WAITS: [(&str, &[Reason]); 43] = [
+const WAITS: [(&str, &[Reason]); 42] = [
     ("mail/foe.rs", &[Retry]),
     ("mail/reader.rs", &[Register]),
     ("mail/voe.rs", &[Register]),
@@ -48,7 +48,6 @@ const WAITS: [(&str, &[Reason]); 43] = [
     ("procedures/al_state.rs", &[Register, Register, Register]),
     ("procedures/cabling.rs", &[Settle, Register, Settle, Retry]),
     ("procedures/clocks/drift.rs", &[Retry, Pace]),
-    ("procedures/clocks/measure.rs", &[Register]),
     ("procedures/clocks/slide.rs", &[Pace]),
     ("procedures/clocks/watch.rs", &[Cyclic]),
     ("procedures/command_watch.rs", &[Cyclic]),
@@ -62,7 +61,7 @@ const WAITS: [(&str, &[Reason]); 43] = [
     ("procedures/junction/isolate.rs", &[Settle]),
     ("procedures/junction/learn.rs", &[Settle]),
     ("procedures/junction/refute.rs", &[Retry]),
-    ("procedures/loops.rs", &[Register]),
+    ("procedures/loops.rs", &[Register, Register]),
     ("procedures/mail_watch.rs", &[Cyclic]),
     ("procedures/mirror.rs", &[Cyclic]),
     ("procedures/presence.rs", &[Register]),

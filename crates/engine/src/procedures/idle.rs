@@ -64,6 +64,9 @@ async fn broadcast(bus: &Bus, segment: &SharedSegment, number: u32, turns: &mut 
     segment.observe(Observation::Words(before));
     segment.board.post_carriers(before.carriers());
     let is_unplugged = before.is_unplugged();
+    if segment.view().is_measuring() {
+        return;
+    }
     let kept = turns.next(segment);
     let reply = if is_unplugged { None } else { ask(bus, &kept).await };
     let now = if is_unplugged { before } else { before.with_ring(&words(bus)) };
