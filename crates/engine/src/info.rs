@@ -6,9 +6,11 @@
 //! process data.
 
 mod collect;
+mod dictionary;
 mod extend;
 mod extent;
 mod identity_field;
+mod object;
 mod pdo_source;
 mod pdos;
 mod subdevice;
@@ -20,8 +22,10 @@ use ringcat_wire::sii::{Category, SiiHeader};
 
 pub use crate::direction::Direction;
 pub(crate) use collect::is_possible;
+pub(crate) use dictionary::{KnownDictionary, MISSING_BYTES, bytes_of_entry, bytes_of_object, place};
 pub use extent::SiiExtent;
 pub use identity_field::IdentityField;
+pub use object::{Entry, Object};
 pub use pdo_source::PdoSource;
 pub use subdevice::{ControllerInfo, MailboxSyncManagers, PdoEntryInfo, PdoInfo, Readout, SubDeviceInfo};
 pub use warning::{InfoWarning, SiiProblem};

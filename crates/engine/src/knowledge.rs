@@ -7,6 +7,7 @@
 
 mod clocks;
 mod code;
+mod dictionary;
 mod error;
 mod subdevice;
 mod topology;
@@ -18,7 +19,7 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::sii::{CategoryKind, SiiHeader};
 
 use crate::clocks::KnownClocks;
-use crate::info::{SiiExtent, SubDeviceInfo};
+use crate::info::{KnownDictionary, SiiExtent, SubDeviceInfo};
 use crate::order::InOrder;
 use crate::ring::RingState;
 use crate::topology::Topology;
@@ -28,7 +29,7 @@ pub use error::KnowledgeError;
 /// First bytes.
 const MAGIC: [u8; 8] = *b"RingCAT\0";
 /// Version of the form of the bytes. Bytes of other versions are refused: the reader scans.
-const VERSION: u16 = 3;
+const VERSION: u16 = 4;
 /// Bytes of magic, version, length and checksum.
 const HEADER: usize = 8 + 2 + 4 + 8;
 /// Bytes of a SubDevice, as a first estimate.
@@ -71,6 +72,8 @@ pub struct Knowledge {
     pub(crate) activations: u32,
     /// SII contents read before.
     pub(crate) siis: Vec<KnownSii>,
+    /// Object dictionaries by type of SubDevice.
+    pub(crate) dictionaries: Vec<KnownDictionary>,
     /// Delays, drifts and cable times, if the clocks were set up.
     pub(crate) clocks: Option<KnownClocks>,
 }
@@ -229,6 +232,7 @@ impl Knowledge {
         self.topology.put(&mut out);
         self.others.put(&mut out);
         self.siis.put(&mut out);
+        self.dictionaries.put(&mut out);
         self.clocks.put(&mut out);
         write_header(&mut out);
         out
@@ -254,12 +258,24 @@ impl Knowledge {
         let stations = input.expected("a station address of its own for each SubDevice");
         let others = take_subdevices(input)?;
         let siis = Vec::take(input)?;
+        let dictionaries = Vec::take(input)?;
         let clocks = clocks::take_checked(input)?;
         if input.left() > 0 {
             return Err(input.expected("the end"));
         }
-        let knowledge =
-            Knowledge { subdevices, others, topology, main_count, ring, sequence, offered, activations, siis, clocks };
+        let knowledge = Knowledge {
+            subdevices,
+            others,
+            topology,
+            main_count,
+            ring,
+            sequence,
+            offered,
+            activations,
+            siis,
+            dictionaries,
+            clocks,
+        };
         if knowledge.are_stations_unique() { Ok(knowledge) } else { Err(stations) }
     }
 
@@ -314,7 +330,7 @@ fn open(bytes: &[u8]) -> Result<Input<'_>, KnowledgeError> {
         return wrong(0, "knowledge of a segment");
     }
     if u16::take(&mut input)? != VERSION {
-        return wrong(8, "version 3");
+        return wrong(8, "version 4");
     }
     if usize::take(&mut input)? != bytes.len().saturating_sub(HEADER) {
         return wrong(10, "the number of bytes behind the header");

@@ -463,6 +463,7 @@ fn choices(options: &Options) -> Choices {
         supervision: options.supervision,
         retries: options.retries,
         pdos: options.pdos_in_preop(),
+        dictionaries: options.dictionaries,
         // Without supervision unassigned SubDevices are not identified as members.
         follow_groups: options.follow_groups && options.supervision,
     }

@@ -59,6 +59,15 @@ impl<L: Links> MainDevice<L> {
         self.finish_scan(on_event)
     }
 
+    /// Scans like [`MainDevice::scan`], and ends a scan that is under way: one that idle operation has begun.
+    ///
+    /// # Errors
+    /// As [`MainDevice::scan`].
+    pub fn restart_scan(&mut self) -> Result<Scan, Error> {
+        self.engine.restart_scan()?;
+        self.finish_scan(|_| ())
+    }
+
     /// Waits for the end of a scan that the engine has begun.
     pub(crate) fn finish_scan(&mut self, mut on_event: impl FnMut(&TimedEvent)) -> Result<Scan, Error> {
         loop {

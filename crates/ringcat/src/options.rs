@@ -35,6 +35,9 @@ pub struct Options {
     pub sii_extent: Option<SiiExtent>,
     /// Dictionaries read for PDOs. `None`: [`ReadPdos::Missing`], in PREOP with idle operation [`ReadPdos::Always`].
     pub pdos: Option<ReadPdos>,
+    /// Whether object dictionaries are read in the background while no application is active, with idle operation:
+    /// descriptions of objects then need no mail. Those that were read on request are kept in any case.
+    pub dictionaries: bool,
     /// Whether a supervision datagram is sent with the process data. Without it changes of the segment are not detected
     /// automatically.
     pub supervision: bool,
@@ -79,6 +82,7 @@ impl Default for Options {
             sii_cache: true,
             sii_extent: None,
             pdos: None,
+            dictionaries: false,
             supervision: true,
             source_address: MacCodec::FlagsFirst,
             settle: Duration::from_millis(5),
@@ -115,6 +119,13 @@ impl Options {
     #[must_use]
     pub fn with_pdos(mut self, pdos: ReadPdos) -> Options {
         self.pdos = Some(pdos);
+        self
+    }
+
+    /// Sets [`Options::dictionaries`].
+    #[must_use]
+    pub fn with_dictionaries(mut self, dictionaries: bool) -> Options {
+        self.dictionaries = dictionaries;
         self
     }
 
@@ -210,6 +221,7 @@ impl Options {
         options.sii_cache = self.sii_cache;
         options.sii_extent = self.sii_extent;
         options.pdos = self.pdos;
+        options.dictionaries = self.dictionaries;
         options.supervision = self.supervision;
         options.codec = self.source_address;
         options.settle = self.settle;

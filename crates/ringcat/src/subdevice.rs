@@ -29,6 +29,8 @@ use std::future::Future;
 use std::time::Duration;
 
 use ringcat_engine::mail::Mailbox;
+use ringcat_engine::mail::coe::ObjectDictionary;
+use ringcat_engine::mail::coe::information::InformationError;
 use ringcat_engine::main_device::{Address, MainDevice as Engine, SubDeviceId};
 use ringcat_wire::address::Position;
 
@@ -121,6 +123,22 @@ impl<S: Services> SubDevice<S> {
     {
         let SubDevice { services, address, within, .. } = self;
         services.call(EngineKey, move |engine| start_with_mailbox(engine, address, within, work))
+    }
+
+    /// Starts a service of the SubDevice's object dictionary.
+    fn ask_dictionary<T, W>(
+        self,
+        work: impl FnOnce(ObjectDictionary) -> W + Send + 'static,
+    ) -> S::Outcome<T, SubDeviceError>
+    where
+        T: Send + 'static,
+        W: Future<Output = Result<T, InformationError>> + 'static,
+    {
+        let SubDevice { services, address, within, .. } = self;
+        services.call(move |engine| {
+            let (known, identity) = (engine.dictionaries(), engine.info(address).map(|info| info.identity));
+            start_with_mailbox(engine, address, within, move |mailbox| work(known.of(&mailbox, identity)))
+        })
     }
 }
 

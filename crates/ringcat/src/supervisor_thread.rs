@@ -231,6 +231,16 @@ impl SupervisorThread {
         self.finish_scan(meanwhile)
     }
 
+    /// Scans like [`SupervisorThread::scan`], and ends a scan that is under way: one that idle operation has begun, or
+    /// one that another thread waits for, which then gets the result of this one.
+    ///
+    /// # Errors
+    /// As [`SupervisorThread::scan`].
+    pub fn restart_scan(&self) -> Result<Scan, Error> {
+        self.act(Engine::restart_scan)??;
+        self.finish_scan(|| ())
+    }
+
     /// Waits for the end of a scan that the engine has begun.
     pub(crate) fn finish_scan(&self, mut meanwhile: impl FnMut()) -> Result<Scan, Error> {
         let mut scan = self.ask(|engine| engine.scan_result());

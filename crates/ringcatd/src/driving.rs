@@ -66,6 +66,7 @@ impl Driving {
         let main_address = acyclic.addresses().main.0;
         let acyclic = QuietLinks::new(acyclic, cyclic, lasting.listened.clone(), opened.clone());
         let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
+        let options = options.with_dictionaries(true);
         let supervisor = match Knowledge::from_bytes(lasting.knowledge) {
             Ok(knowledge) => SupervisorThread::start_resumed(acyclic, &options, (knowledge, handover), || ()),
             // Nothing is known yet.

@@ -53,7 +53,7 @@ pub const ENGINE: &[(&str, &[&str])] = &[
         "clocks", "layout", "event"]),
     // acyclic half
     ("supervisor", &["time", "bell", "link", "queue", "ring", "board", "event", "role"]),
-    ("mail", &["declared", "time", "config", "event", "knowledge", "supervisor", "role"]),
+    ("mail", &["declared", "time", "info", "config", "event", "knowledge", "supervisor", "role"]),
     ("procedures", &["order", "declared", "domain", "time", "bell", "link", "queue", "ring", "board", "info",
         "topology", "ring_status", "config", "clocks", "plan", "layout", "event", "knowledge", "segment",
         "supervisor", "mail", "request", "junction", "role"]),

@@ -28,6 +28,7 @@ fn of(nodes: Vec<Node>) -> Knowledge {
         offered: StationAddress(0xC001),
         activations: 9,
         siis: Vec::new(),
+        dictionaries: Vec::new(),
         clocks: Some(clocks_of_two()),
     }
 }

@@ -18,6 +18,7 @@ use crate::declared::Address;
 use crate::role::Function;
 use crate::supervisor::Bus;
 use crate::supervisor::memory_writes::UnderWayWrite;
+use crate::time::Instant;
 
 /// The handle to a SubDevice's mailbox and its router; copies are handles to the same mailbox. It stays valid while the
 /// SubDevice is absent: while the mailbox is not in use, every request ends with [`MailboxError::Closed`].
@@ -90,6 +91,12 @@ impl Mailbox {
     pub fn station(&self) -> Option<StationAddress> {
         let state = self.shared.state();
         state.session.filter(|_| state.open).map(|session| session.station)
+    }
+
+    /// The session, by the station address of the SubDevice and its beginning, while the mailbox may be used.
+    pub(crate) fn session(&self) -> Option<(StationAddress, Instant)> {
+        let state = self.shared.state();
+        state.session.filter(|_| state.open).map(|session| (session.station, session.since))
     }
 
     /// Station address of the SubDevice and status register of its send mailbox, while the mailbox may be used.

@@ -12,6 +12,7 @@ use super::activate_error::ActivateError;
 use crate::info::{PdoSource, SubDeviceInfo};
 use crate::knowledge::{Handover, Knowledge, KnownMailbox, KnownProgress, KnownSubDevice};
 use crate::procedures::resume::{Before, Known, resume};
+use crate::procedures::scan::unless_another;
 use crate::ring::Sequence;
 use crate::role::Function;
 use crate::segment::clocks::ClockObservation;
@@ -45,6 +46,7 @@ impl MainDevice {
             offered: view.last_offered(),
             activations: self.activations,
             siis: self.cache.known(),
+            dictionaries: self.segment.dictionaries.known(),
             clocks: view.known_clocks().map(|known| (*known).clone()),
         })
     }
@@ -95,12 +97,13 @@ impl MainDevice {
             return Err(ActivateError::Scanning);
         }
         let Knowledge { subdevices, others, topology, main_count, ring, .. } = knowledge;
-        let Knowledge { sequence, offered, activations, siis, clocks, .. } = knowledge;
+        let Knowledge { sequence, offered, activations, siis, dictionaries, clocks, .. } = knowledge;
         self.supervisor.assume_ring(ring);
         self.segment.observe(Observation::ScanBegun);
         *self.scan_error.borrow_mut() = None;
         self.emergencies.borrow_mut().forget_positions();
         self.cache.learn(siis);
+        self.segment.dictionaries.learn(dictionaries);
         if let Some(known) = clocks {
             self.segment.observe_clocks(ClockObservation::Known(Rc::new(known)));
         }
@@ -114,8 +117,10 @@ impl MainDevice {
         let before = Before { all, found, handover };
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.scan_error.clone());
         let options = self.own_scan_options();
+        let number = self.segment.view().scan_number();
         self.supervisor.spawn(async move {
-            if let Err(error) = resume(&bus, &segment, &options, before).await {
+            let resumed = unless_another(&segment, number, resume(&bus, &segment, &options, before)).await;
+            if let Some(Err(error)) = resumed {
                 let reason = slot.borrow_mut().insert(error).to_string();
                 segment.observe(Observation::ScanEnded(Err(reason)));
             }

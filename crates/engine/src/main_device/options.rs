@@ -34,6 +34,9 @@ pub struct Options {
     /// undeclared SubDevices in PREOP. `None`: after a scan [`ReadPdos::Missing`], in PREOP [`ReadPdos::Always`] with
     /// idle operation and [`ReadPdos::Missing`] without.
     pub pdos: Option<ReadPdos>,
+    /// Whether object dictionaries are read in the background while no application is active, with idle operation.
+    /// Those that were read on request are kept in any case.
+    pub dictionaries: bool,
     /// Whether a supervision datagram is sent with the process data. Without it changes of the segment are not detected
     /// automatically.
     pub supervision: bool,
@@ -73,6 +76,7 @@ impl Options {
             sii_cache: true,
             sii_extent: None,
             pdos: None,
+            dictionaries: false,
             supervision: true,
             settle: Duration::from_millis(5),
             patience: Duration::from_secs(5),

@@ -6,24 +6,39 @@ use alloc::vec::Vec;
 use super::MainDevice;
 use super::activate_error::ActivateError;
 use crate::info::{SiiExtent, SubDeviceInfo};
-use crate::procedures::scan::{Scan, ScanError, ScanOptions, end_scan, scan};
+use crate::procedures::loops::restore;
+use crate::procedures::scan::{Scan, ScanError, ScanOptions, end_scan, scan, unless_another};
 use crate::role::Function;
 use crate::segment::{Observation, ReadPdos};
+
+/// What a scan ends when it begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Ends {
+    /// It is refused while another one is under way.
+    Nothing,
+    TheOneUnderWay,
+}
 
 impl MainDevice {
     /// Starts a scan, which puts all SubDevices into INIT. Refused while active.
     pub fn start_scan(&mut self) -> Result<(), ActivateError> {
-        self.begin_scan(self.options.sii_extent.unwrap_or_default())
+        self.begin_scan(self.options.sii_extent.unwrap_or_default(), Ends::Nothing)
+    }
+
+    /// Starts a scan as [`MainDevice::start_scan`], and ends one that is under way: also one of idle operation, or one
+    /// that goes on with the knowledge of another process. [`MainDevice::scan_result`] has the result of the new one.
+    pub fn restart_scan(&mut self) -> Result<(), ActivateError> {
+        self.begin_scan(self.options.sii_extent.unwrap_or_default(), Ends::TheOneUnderWay)
     }
 
     /// As [`MainDevice::start_scan`]; of the SIIs it reads what operation needs, unless the options name an extent.
     pub fn start_scan_for_operation(&mut self) -> Result<(), ActivateError> {
-        self.begin_scan(self.options.sii_extent.unwrap_or(SiiExtent::Operation))
+        self.begin_scan(self.options.sii_extent.unwrap_or(SiiExtent::Operation), Ends::Nothing)
     }
 
-    fn begin_scan(&mut self, extent: SiiExtent) -> Result<(), ActivateError> {
+    fn begin_scan(&mut self, extent: SiiExtent, ends: Ends) -> Result<(), ActivateError> {
         self.permit(Function::Scan)?;
-        if self.segment.view().is_scanning() {
+        if ends == Ends::Nothing && self.segment.view().is_scanning() {
             return Err(ActivateError::Scanning);
         }
         self.segment.observe(Observation::ScanBegun);
@@ -31,10 +46,16 @@ impl MainDevice {
         self.emergencies.borrow_mut().forget_positions();
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.scan_error.clone());
         let options = self.scan_options(extent);
+        let number = self.segment.view().scan_number();
         self.supervisor.spawn(async move {
-            let result = scan(&bus, &segment, &options).await;
-            let ended = result.map_err(|error| slot.borrow_mut().insert(error).to_string());
-            end_scan(&segment, ended);
+            let scanned = unless_another(&segment, number, async {
+                restore(&bus, &segment).await;
+                scan(&bus, &segment, &options).await
+            });
+            if let Some(result) = scanned.await {
+                let ended = result.map_err(|error| slot.borrow_mut().insert(error).to_string());
+                end_scan(&segment, ended);
+            }
         });
         self.begin_idle();
         Ok(())

@@ -14,6 +14,7 @@ use super::MainDevice;
 use super::pending::Pending;
 use crate::declared::{Address, SubDeviceId};
 use crate::info::SubDeviceInfo;
+use crate::mail::coe::Dictionaries;
 use crate::procedures::complete_siis::complete;
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::idle::rescue;
@@ -32,6 +33,11 @@ impl MainDevice {
     pub fn station(&self, subdevice: impl Into<Address>) -> Option<StationAddress> {
         let view = self.segment.view();
         view.station(view.find(subdevice)?)
+    }
+
+    /// Object dictionaries that were read before, for all SubDevices.
+    pub fn dictionaries(&self) -> Dictionaries {
+        self.segment.dictionaries.clone()
     }
 
     /// Identity and features of a SubDevice as the scan found them, or as they were read when it came later; `None` if

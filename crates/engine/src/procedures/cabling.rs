@@ -163,7 +163,7 @@ async fn scan_once(bus: &Bus, known: &impl Known) -> Result<Option<LineCheck>, B
     let closed_before = bus.ring() == RingState::Closed;
     let Some(before) = view(bus).await?.filter(|view| known.are_known(&view.stations)) else { return Ok(None) };
     let Some(ports) = ports_of(bus, &before.stations).await? else { return Ok(None) };
-    let _latches = latch_anyway(bus).await?;
+    let _latches = latch_anyway(bus, None).await?;
     let read = bus.gather(before.stations.clone(), |bus, station| async move {
         // A SubDevice without a clock does not increment the WKC.
         match bus.fprd_array(station, map::DC_RECEIVE_TIME).await {

@@ -28,7 +28,7 @@ pub(crate) use rescue::rescue;
 
 use self::state_turns::StateTurns;
 use super::read_state;
-use super::scan::{ScanError, ScanOptions, end_scan, scan};
+use super::scan::{ScanError, ScanOptions, end_scan, scan, unless_another};
 use super::shared_segment::{SharedSegment, until_active};
 use crate::board::{RingWord, Supervision};
 use crate::event::Subject;
@@ -64,6 +64,9 @@ async fn broadcast(bus: &Bus, segment: &SharedSegment, number: u32, turns: &mut 
     segment.observe(Observation::Words(before));
     segment.board.post_carriers(before.carriers());
     let is_unplugged = before.is_unplugged();
+    if segment.view().is_measuring() {
+        return;
+    }
     let kept = turns.next(segment);
     let reply = if is_unplugged { None } else { ask(bus, &kept).await };
     let now = if is_unplugged { before } else { before.with_ring(&words(bus)) };
@@ -103,10 +106,12 @@ async fn ask(bus: &Bus, kept: &[(SubDeviceKey, Option<u32>)]) -> Option<(Supervi
 }
 
 /// The first scan, as soon as a SubDevice answers.
-pub(super) async fn scan_segment(bus: Bus, segment: SharedSegment, options: ScanOptions) {
+pub(super) async fn scan_segment(bus: Bus, segment: SharedSegment, options: ScanOptions, number: u32) {
     until_active(&segment, async {
-        let ended = scan(&bus, &segment, &options).await.map_err(|error| error.to_string());
-        end_scan(&segment, ended);
+        let scanned = unless_another(&segment, number, scan(&bus, &segment, &options)).await;
+        if let Some(ended) = scanned {
+            end_scan(&segment, ended.map_err(|error| error.to_string()));
+        }
         segment.observe_idle(IdleObservation::Scanned);
     })
     .await;
@@ -115,8 +120,9 @@ pub(super) async fn scan_segment(bus: Bus, segment: SharedSegment, options: Scan
 /// A scan after a change, or on request.
 pub(super) async fn follow_change(bus: Bus, segment: SharedSegment, options: ScanOptions, change: Change) {
     until_active(&segment, async {
-        let versions = segment.view().versions();
-        let seen = match follow(&bus, &segment, &options, change).await {
+        let (versions, number) = (segment.view().versions(), segment.view().scan_number());
+        let followed = unless_another(&segment, number, follow(&bus, &segment, &options, change)).await;
+        let seen = match followed.unwrap_or(Ok(None)) {
             Ok(Some(found)) => IdleObservation::Followed { versions, found: Rc::new(found), wanted: change.wanted },
             Ok(None) => IdleObservation::NotFollowed(None),
             Err(error) => IdleObservation::NotFollowed(Some(error.to_string())),

@@ -54,9 +54,9 @@ pub(super) async fn latch(bus: &Bus, pauses: Pauses, no_return: Option<Link>) ->
 }
 
 /// The same, alone if possible; otherwise other frames may falsify some receive times.
-pub(super) async fn latch_anyway(bus: &Bus) -> Result<Latches, BusError> {
+pub(super) async fn latch_anyway(bus: &Bus, no_return: Option<Link>) -> Result<Latches, BusError> {
     let _turn = bus.latch_turn().await;
-    let (answered, sent_at) = match send(bus, Pauses::Forbidden, None).await {
+    let (answered, sent_at) = match send(bus, Pauses::Forbidden, no_return).await {
         Err(BusError::Busy { .. } | BusError::Disturbed { .. }) => {
             let reply = bus.bwr(map::DC_RECEIVE_TIME, &[0; 4]).await?;
             (reply.wkc(), reply.sent_at)

@@ -9,9 +9,10 @@ use core::time::Duration;
 use ringcat_wire::address::{RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
-use ringcat_wire::register::{DlControl, map};
+use ringcat_wire::register::{DlControl, LoopControl, map};
 
 use super::shared_segment::SharedSegment;
+use crate::ring::RingState;
 use crate::segment::Observation;
 use crate::supervisor::{Bus, BusError};
 
@@ -25,6 +26,11 @@ const PAUSE: Duration = Duration::from_millis(20);
 const TRIES: usize = 2;
 /// Attempts to read settings while the application writes them.
 const READS: usize = 4;
+
+/// Maximum wait until an opened ring is closed again: temporary loop settings expire within a second.
+const CLOSING_LIMIT: Duration = Duration::from_millis(1_200);
+/// Interval of the check whether the ring is closed.
+const CLOSING_PAUSE: Duration = Duration::from_millis(1);
 
 /// The byte of DL_CONTROL with the loop settings of all ports.
 pub(super) const LOOPS: RegisterAddress = map::DL_CONTROL.offset(1);
@@ -90,4 +96,26 @@ pub(crate) async fn restore(bus: &Bus, segment: &SharedSegment) {
     }
     // Those that were not reached restore themselves when the temporary settings expire.
     segment.observe(Observation::PortsAltered(&[]));
+}
+
+/// The same settings of a SubDevice, with these of its ports closed for a moment.
+pub(super) fn closed_at(control: DlControl, station: StationAddress, ports: &[(StationAddress, u8)]) -> DlControl {
+    let mut loops = control.loops;
+    for (_, port) in ports.iter().filter(|(of, _)| *of == station) {
+        loops[usize::from(port & 3)] = LoopControl::Closed;
+    }
+    DlControl { temporary: true, loops, ..control }
+}
+
+/// Waits until frames on both links have shown that the ring is closed.
+pub(super) async fn until_ring_is_closed(bus: &Bus) {
+    let until = bus.now() + CLOSING_LIMIT;
+    while bus.now() < until {
+        bus.sleep(CLOSING_PAUSE).await;
+        let _ = bus.brd(map::TYPE, 1).await;
+        let in_cycles = bus.board().map(|board| board.ring().state);
+        if bus.ring() == RingState::Closed && in_cycles != Some(RingState::Open) {
+            break;
+        }
+    }
 }

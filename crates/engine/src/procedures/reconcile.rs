@@ -19,7 +19,7 @@ use super::shared_segment::{SharedSegment, until_active};
 use super::supervise::{run_round, supervise};
 use super::unassigned::read_unassigned;
 use super::unassigned::rescan::follow_groups;
-use super::undeclared::{bring_undeclared, keep, keep_outputs, read_pdos, watch_undeclared_mail};
+use super::undeclared::{bring_undeclared, keep, keep_outputs, read_dictionaries, read_pdos, watch_undeclared_mail};
 use super::verify::verify;
 use crate::segment::effect::{Task, Watch};
 use crate::supervisor::Bus;
@@ -56,7 +56,9 @@ pub(crate) async fn reconcile(bus: Bus, segment: SharedSegment, companions: Comp
             Task::BringUndeclared { key, attempt } => bus.spawn(bring_undeclared(own_bus, own, (key, attempt))),
             Task::ReadPdos { key, attempt } => bus.spawn(read_pdos(own_bus, own, (key, attempt))),
             Task::KeepOutputs { key, attempt } => bus.spawn(keep_outputs(own_bus, own, (key, attempt))),
-            Task::ScanSegment => bus.spawn(scan_segment(own_bus, own, companions.options.clone())),
+            Task::ScanSegment { number } => {
+                bus.spawn(scan_segment(own_bus, own, companions.options.clone(), number));
+            }
             Task::FollowChange(change) => {
                 bus.spawn(follow_change(own_bus, own, companions.options.clone(), change));
             }
@@ -86,5 +88,6 @@ fn start_watch(which: Watch, bus: Bus, segment: SharedSegment, companions: &Comp
         Watch::Idle => bus.spawn(watch(own, segment)),
         Watch::Undeclared => bus.spawn(keep(own, segment)),
         Watch::UndeclaredMail => bus.spawn(watch_undeclared_mail(own, segment)),
+        Watch::Dictionaries => bus.spawn(read_dictionaries(own, segment)),
     }
 }

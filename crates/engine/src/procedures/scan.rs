@@ -33,7 +33,7 @@ use ringcat_wire::sii::SiiHeader;
 pub(crate) use self::cabling::cabling_findings;
 use self::cabling::locate_crossings;
 use self::count::Count;
-pub(crate) use self::end::end_scan;
+pub(crate) use self::end::{end_scan, unless_another};
 pub use self::error::ScanError;
 pub use self::options::ScanOptions;
 use self::power_on::PowerOns;

@@ -3,6 +3,7 @@
 
 pub mod eeprom_owner;
 pub mod forced_state;
+mod open_ring;
 pub mod port_report;
 pub mod ports;
 pub mod registers;

@@ -18,6 +18,7 @@ use super::undeclared::UndeclaredMailboxes;
 use crate::board::Board;
 use crate::link::{Link, LinkOrder};
 use crate::mail::Mailbox;
+use crate::mail::coe::Dictionaries;
 use crate::segment::clocks::{ClockFinding, ClockObservation, ClockVersions};
 use crate::segment::disturbance::{Disturbance, Wanted};
 use crate::segment::effect::{Effect, Task};
@@ -45,6 +46,8 @@ pub struct SharedSegment {
     pub board: Arc<Board>,
     /// SII contents read before.
     pub cache: SiiCache,
+    /// Object dictionaries read before.
+    pub(crate) dictionaries: Dictionaries,
     /// Turns at EEPROMs.
     pub eeproms: EepromTurns,
     /// Error counters.
@@ -88,6 +91,7 @@ impl SharedSegment {
     pub fn without_application(&self, bus: &Bus) -> SharedSegment {
         let undeclared = self.undeclared.renewed(bus);
         let without = SharedSegment::without(bus, self.segment.clone(), self.cache.clone(), undeclared);
+        let without = SharedSegment { dictionaries: self.dictionaries.clone(), ..without };
         if self.view().has_idle_operation() {
             without.board.go_on_from(&self.board);
         }
@@ -108,6 +112,7 @@ impl SharedSegment {
             bus: bus.clone(),
             board: Arc::new(Board::new(0)),
             cache,
+            dictionaries: Dictionaries::default(),
             eeproms: EepromTurns::new(bus),
             statistics: ErrorStatistics::new(bus, 0, None),
             results: AttemptResults::default(),

@@ -3,6 +3,7 @@
 
 mod attempt;
 mod bring;
+mod dictionaries;
 mod keep;
 mod mail;
 mod mailboxes;
@@ -10,6 +11,7 @@ mod request;
 
 pub(super) use attempt::bring_undeclared;
 pub(super) use bring::{keep_outputs, read_pdos, unmap};
+pub(super) use dictionaries::read_dictionaries;
 pub(super) use keep::{keep, settle};
 pub(super) use mail::watch_undeclared_mail;
 pub(crate) use mailboxes::UndeclaredMailboxes;

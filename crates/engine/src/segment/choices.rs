@@ -43,4 +43,6 @@ pub struct Choices {
     pub retries: Retries,
     /// Dictionaries that are read of undeclared SubDevices in PREOP, SAFEOP and OP.
     pub pdos: ReadPdos,
+    /// Without an application object dictionaries are read.
+    pub dictionaries: bool,
 }

@@ -81,6 +81,8 @@ pub enum Watch {
     Undeclared,
     /// Reads the mail status of undeclared SubDevices.
     UndeclaredMail,
+    /// Without an application: reads object dictionaries.
+    Dictionaries,
 }
 
 /// A procedure on the bus. It returns its result as an observation.
@@ -154,7 +156,10 @@ pub enum Task {
         attempt: u32,
     },
     /// Scans the segment without an application for the first time.
-    ScanSegment,
+    ScanSegment {
+        /// Its number.
+        number: u32,
+    },
     /// Scans it again after a change, or on request.
     FollowChange(Change),
     /// Reads the states of all SubDevices that are kept in their states.

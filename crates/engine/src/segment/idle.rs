@@ -66,6 +66,8 @@ pub(super) enum Work {
     FollowReads,
     /// Reads of all states.
     ReadStates,
+    /// Delays are measured: the ring is open on purpose.
+    Measurement,
     /// The end of an application.
     Deactivation,
 }

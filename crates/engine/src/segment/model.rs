@@ -175,6 +175,16 @@ impl Segment {
         matches!(self.stage, Stage::Scanning { .. })
     }
 
+    /// Number of the scan that has begun last.
+    pub fn scan_number(&self) -> u32 {
+        self.addresses.version()
+    }
+
+    /// Whether another scan is under way than that with this number.
+    pub fn has_another_scan(&self, number: u32) -> bool {
+        self.is_scanning() && self.scan_number() != number
+    }
+
     /// Whether a scan that the application has requested is under way.
     pub fn is_requested_scan_under_way(&self) -> bool {
         matches!(self.stage, Stage::Scanning { is_requested: true })

@@ -77,6 +77,7 @@ fn ring_rules() -> Rules<'static> {
 /// Choices of an application with default options.
 fn choices() -> Choices {
     Choices {
+        dictionaries: false,
         enhanced_line_crossed: false,
         junctions: JunctionMode::Disabled,
         follow_groups: false,

@@ -4,7 +4,7 @@ use ringcat_engine::mail::coe::history::{self, History};
 use ringcat_engine::mail::coe::information::{self, Entry as ObjectEntry, Object};
 use ringcat_engine::mail::coe::{self, SdoAddress};
 use ringcat_engine::mail::stream::{Sink, Source};
-use ringcat_wire::mailbox::coe::{ListType, ValueInfo};
+use ringcat_wire::mailbox::coe::ListType;
 
 use super::{SubDevice, SubDeviceError, SubDeviceFailure};
 use crate::services::Services;
@@ -88,9 +88,10 @@ impl<S: Services> SubDevice<S> {
         self.ask_mailbox(move |mailbox| async move { coe::download(&mailbox, object, limits, &mut source).await })
     }
 
-    /// Indices of all objects that the SubDevice has (SDO information).
+    /// Indices of all objects that the SubDevice has (SDO information), asked of it.
     pub fn sdo_info(self) -> S::Outcome<Vec<u16>, SubDeviceError> {
-        self.sdo_list(ListType::All)
+        let limits = self.limits.of_message();
+        self.ask_dictionary(move |dictionary| async move { dictionary.list(limits).await })
     }
 
     /// Indices of the objects in one of the SubDevice's lists.
@@ -105,20 +106,18 @@ impl<S: Services> SubDevice<S> {
         self.ask_mailbox(move |mailbox| async move { information::lengths(&mailbox, limits).await.map(ListLengths) })
     }
 
-    /// Reads the description of an object (SDO information): name, kind, largest subindex.
+    /// The description of an object (SDO information): name, kind, largest subindex. It is read unless a SubDevice of
+    /// the same type has returned it before.
     pub fn sdo_object(self, index: u16) -> S::Outcome<Object, SubDeviceError> {
         let limits = self.limits.of_message();
-        self.ask_mailbox(move |mailbox| async move { information::object(&mailbox, index, limits).await })
+        self.ask_dictionary(move |dictionary| async move { dictionary.object(index, limits).await })
     }
 
-    /// Reads the description of an entry (SDO information): name, type, access rights, unit, default and range.
+    /// The description of an entry (SDO information): name, type, access rights, unit, default and range. It is read
+    /// unless a SubDevice of the same type has returned it before.
     pub fn sdo_entry(self, index: u16, sub_index: u8) -> S::Outcome<ObjectEntry, SubDeviceError> {
         let limits = self.limits.of_message();
-        let all = ValueInfo::UNIT | ValueInfo::DEFAULT | ValueInfo::MINIMUM | ValueInfo::MAXIMUM;
-        let work = move |mailbox| async move {
-            information::entry(&mailbox, (index, sub_index), ValueInfo(all), limits).await
-        };
-        self.ask_mailbox(work)
+        self.ask_dictionary(move |dictionary| async move { dictionary.entry((index, sub_index), limits).await })
     }
 
     /// The diagnosis history (object 0x10F3) with all its messages.

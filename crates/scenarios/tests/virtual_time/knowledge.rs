@@ -6,6 +6,7 @@ mod bytes;
 mod changes;
 mod clocks;
 mod crashes;
+mod dictionaries;
 mod frames;
 mod mail;
 mod pdos;

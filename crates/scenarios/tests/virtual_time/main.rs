@@ -91,6 +91,7 @@ mod ring_remerge;
 mod ring_services;
 mod role_changes;
 mod roles;
+mod scan_restarts;
 mod services;
 mod several_areas;
 mod shared_image;

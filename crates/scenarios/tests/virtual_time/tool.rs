@@ -186,13 +186,10 @@ fn ports_of_all_are_reported_with_neighbours_delays_and_counters() {
             assert_eq!(used, it.ports.map(|port| port.neighbour.is_some()), "{at}");
             let closed = it.ports.map(|port| port.registers.expect("it answers").loop_closed);
             assert_eq!(closed, used.map(|used| !used));
-            // In a closed ring no frame returns to the port at which it left.
-            let delay = (!is_ring).then_some(HOP_NS * at as i64);
-            let error = it.delay_ns.zip(delay).map(|(is, expected)| (is - expected).abs());
-            assert_eq!(it.delay_ns.is_some(), delay.is_some(), "{at}");
-            assert!(error.is_none_or(|error| error <= 10), "SubDevice {at}: {it:?}");
+            let error = it.delay_ns.map(|delay| (delay - HOP_NS * at as i64).abs());
+            assert!(error.is_some_and(|error| error <= 10), "SubDevice {at}: {it:?}");
             let next = it.ports[1].delay_ns;
-            assert_eq!(next.is_some(), !is_ring && at + 1 < COUNT);
+            assert_eq!(next.is_some(), at + 1 < COUNT);
             assert!(next.is_none_or(|next| (next - HOP_NS).abs() <= 20), "{next:?}");
         }
         // Damaged frames, and a SubDevice that does not answer.
@@ -207,6 +204,72 @@ fn ports_of_all_are_reported_with_neighbours_delays_and_counters() {
         let report = main_device.port_report().expect("it can be asked");
         let silent = |it: &SubDevicePorts| it.unit_errors.is_none() && it.ports.iter().all(|p| p.registers.is_none());
         assert!(silent(&report[COUNT - 1]) && !report[..COUNT - 1].iter().any(silent));
+    }
+}
+
+/// A ring is opened at its last port for the delays, and closed again: nothing is reported, and no transfer fails.
+// covers: registers, ring-goes-on
+#[test]
+fn delays_of_a_ring_without_an_application_are_measured_and_it_is_closed_again() {
+    const COUNT: usize = 12;
+    for with_idle in [true, false] {
+        let options_of = Options::default().with_idle_operation(with_idle);
+        let network = ring(clocked_segment(COUNT), options());
+        let mut main_device = MainDevice::request(Tap::new(network), &options_of);
+        main_device.scan().expect("a scan");
+        main_device.attend(FOLLOWED);
+        while main_device.pop_event().is_some() {}
+        for _ in 0..5 {
+            let begun = main_device.now();
+            let report = main_device.port_report().expect("all answer");
+            assert!(main_device.now().since(begun) < Duration::from_millis(100));
+            assert!(report.iter().all(|it| it.delay_ns.is_some()), "{report:?}");
+            let loops = |device: &ringcat_sim::device::Device| device.controller.register(map::DL_CONTROL, 2)[1];
+            assert!(main_device.links_mut().network().devices().all(|device| loops(device) == 0));
+            main_device.attend(Duration::from_millis(200));
+            let said: Vec<_> = std::iter::from_fn(|| main_device.pop_event()).collect();
+            assert!(said.is_empty(), "idle operation {with_idle}: {said:?}");
+        }
+        // A job that no longer waits leaves the ring closed as well.
+        for after in 0..40 {
+            let report = main_device.engine_mut().start_port_report();
+            main_device.attend(Duration::from_micros(150 * after));
+            drop(report);
+            main_device.attend(Duration::from_millis(100));
+            let loops = |device: &ringcat_sim::device::Device| device.controller.register(map::DL_CONTROL, 2)[1];
+            assert!(main_device.links_mut().network().devices().all(|device| loops(device) == 0), "{after}");
+        }
+        assert!(std::iter::from_fn(|| main_device.pop_event()).next().is_none());
+    }
+}
+
+/// A cable is cut, or SubDevices lose their power, at every moment of a measurement: it is followed as at any time.
+// covers: registers, ring-cut
+#[test]
+fn a_ring_that_breaks_while_it_is_measured_is_followed() {
+    for cable in [0, 2, 6] {
+        for after in 0..30 {
+            let network = ring(clocked_segment(6), options());
+            let mut main_device = MainDevice::request(Tap::new(network), &Options::default().with_idle_operation(true));
+            main_device.attend(FOLLOWED);
+            let report = main_device.engine_mut().start_port_report();
+            main_device.attend(Duration::from_micros(200 * after));
+            main_device.links_mut().network_mut().apply(Fault::Cut(CableId(cable)));
+            main_device.attend(Duration::from_secs(2));
+            drop(report);
+            assert_eq!(main_device.subdevices().len(), 6, "cable {cable}, {after}");
+            let delays = main_device.port_report().expect("all answer");
+            let error = |(at, it): (usize, &SubDevicePorts)| Some((it.delay_ns? - HOP_NS * at as i64).abs());
+            if cable == 6 {
+                let errors = delays.iter().enumerate().map(error);
+                assert!(errors.clone().all(|error| error.is_some_and(|error| error <= 10)), "{after}: {delays:?}");
+            }
+            main_device.links_mut().network_mut().apply(Fault::Heal(CableId(cable)));
+            main_device.attend(Duration::from_secs(1));
+            let delays = main_device.port_report().expect("all answer");
+            let errors = delays.iter().enumerate().map(error);
+            assert!(errors.clone().all(|error| error.is_some_and(|error| error <= 10)), "{after}: {delays:?}");
+        }
     }
 }
 

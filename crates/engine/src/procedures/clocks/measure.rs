@@ -22,7 +22,7 @@ use crate::event::Subject;
 use crate::link::{Link, LinkSet};
 use crate::order::InOrder;
 use crate::procedures::latch::{self as frames, Pauses};
-use crate::procedures::loops::{followed, restore, write};
+use crate::procedures::loops::{closed_at, followed, restore, until_ring_is_closed, write};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::unassigned::view;
 use crate::ring::RingState;
@@ -41,11 +41,6 @@ const MOST_FAILURES: u32 = 16;
 const SCANS: u32 = 3;
 /// Maximum wait for other disturbances before rings are opened.
 const LIMIT: Duration = Duration::from_secs(5);
-/// Maximum wait until an opened ring is closed again: temporary loop settings expire within a second.
-const CLOSING_LIMIT: Duration = Duration::from_millis(1_200);
-/// Interval of the check whether the ring is closed.
-const CLOSING_PAUSE: Duration = Duration::from_millis(1);
-
 /// The SubDevices that answer, in the order in which frames pass them.
 #[derive(Clone, Debug)]
 struct Survey {
@@ -186,7 +181,7 @@ async fn measure_open(
     };
     restore(bus, segment).await;
     if survey.is_closed {
-        wait_for_ring(bus).await;
+        until_ring_is_closed(bus).await;
     }
     drop(turn);
     result
@@ -210,19 +205,6 @@ async fn measure_branches(bus: &Bus, segment: &SharedSegment, survey: &Survey, r
     lines.open(rings);
     for set in branches::sets(&lines, &has_clock) {
         let _ = measure_open(bus, segment, survey, rings, &set).await;
-    }
-}
-
-/// Waits until frames on both links have shown that the ring is closed.
-async fn wait_for_ring(bus: &Bus) {
-    let until = bus.now() + CLOSING_LIMIT;
-    while bus.now() < until {
-        bus.sleep(CLOSING_PAUSE).await;
-        let _ = bus.brd(map::TYPE, 1).await;
-        let in_cycles = bus.board().map(|board| board.ring().state);
-        if bus.ring() == RingState::Closed && in_cycles != Some(RingState::Open) {
-            break;
-        }
     }
 }
 
@@ -473,12 +455,4 @@ async fn controls(
         controls.push((station, control));
     }
     Ok(controls)
-}
-
-fn closed_at(control: DlControl, station: StationAddress, ports: &[(StationAddress, u8)]) -> DlControl {
-    let mut loops = control.loops;
-    for (_, port) in ports.iter().filter(|(of, _)| *of == station) {
-        loops[usize::from(port & 3)] = LoopControl::Closed;
-    }
-    DlControl { temporary: true, loops, ..control }
 }

@@ -2,10 +2,12 @@
 //! application (protocol 2.3 to 2.5, 7.1).
 //!
 //! Without an application frames are latched for the receive times, `SAMPLES` for a mean: a clock counts in steps of
-//! 10 ns. While an application is active its clocks own the latches: then the times are those of the last latched
-//! frame, and the delays those that were measured.
+//! 10 ns. A frame passes each SubDevice of a closed ring only once, so a ring of two links is opened for this.
+//! While an application is active its clocks own the latches: then the times are those of the last latched frame, and
+//! the delays those that were measured.
 
 use alloc::collections::BTreeMap;
+use alloc::rc::Rc;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -15,6 +17,7 @@ use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DcReceiveTimes, DlStatus, ErrorCounters, PortKind, map};
 
 use super::ServiceError;
+use super::open_ring::while_open;
 use crate::clocks::{Cables, Latched, Measurements, Wiring};
 use crate::declared::{Address, SubDeviceId};
 use crate::link::{Link, LinkSet};
@@ -90,12 +93,15 @@ pub struct SubDevicePorts {
     /// Port 0 to 3.
     pub ports: [PortReport; 4],
     /// Delay from the reference clock in nanoseconds; before an application is active, and without distributed clocks,
-    /// from the first SubDevice with a clock. `None` without a clock, or if it is not known: in a closed ring
-    /// before the clocks of an application have measured it.
+    /// from the first SubDevice with a clock. `None` without a clock, or if it is not known: with rings behind
+    /// junctions, and while the segment changes.
     pub delay_ns: Option<i64>,
     /// EPU_ERROR_COUNTER (0x030C); `None` if it does not answer.
     pub unit_errors: Option<u8>,
 }
+
+/// Receive times of one frame, by SubDevice.
+type Sample = Vec<Option<Latched>>;
 
 /// What is known before registers are read.
 struct Known {
@@ -143,28 +149,51 @@ struct Readings {
 /// Reads the ports of all SubDevices, in the order of positions.
 pub(crate) async fn read(bus: &Bus, segment: &SharedSegment) -> Result<Vec<SubDevicePorts>, ServiceError> {
     let Some(known) = Known::of(&segment.view()) else { return Ok(Vec::new()) };
-    let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
-    let mut samples = Vec::new();
-    if known.delays.is_none() && !is_closed {
-        while samples.len() < SAMPLES {
-            // Lost frames leave fewer samples; another attempt costs time without end.
-            let Ok(sample) = sample(bus, &known).await else { break };
-            samples.push(sample);
-        }
+    let known = Rc::new(known);
+    if known.delays.is_none() {
+        // The state of the ring is that of the last frames, which may be old without idle operation.
+        let _ = bus.brd(map::TYPE, 1).await;
     }
+    let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
+    let samples = match known.delays {
+        Some(_) => Vec::new(),
+        None if is_closed => samples_of_ring(bus, segment, &known).await,
+        None => samples(bus, &known, None).await,
+    };
     let each: Vec<(StationAddress, bool)> =
         known.stations.iter().copied().zip(known.has_clock.iter().copied()).collect();
     let readings = bus.gather(each, |bus, (station, clock)| async move { one(&bus, station, clock).await.ok() }).await;
     let delays = match &known.delays {
         Some(delays) => known.stations.iter().map(|station| delays.get(station).copied()).collect(),
-        None => measured(&known, &readings, samples),
+        None => measured(&known, is_closed, &readings, samples),
     };
     Ok(reports(&known, &readings, &delays, bus.links()))
 }
 
+/// Receive times of some frames. Copies on the link `no_return` do not return.
+async fn samples(bus: &Bus, known: &Known, no_return: Option<Link>) -> Vec<Sample> {
+    let mut samples = Vec::new();
+    while samples.len() < SAMPLES {
+        // Lost frames leave fewer samples; another attempt costs time without end.
+        let Ok(sample) = sample(bus, known, no_return).await else { break };
+        samples.push(sample);
+    }
+    samples
+}
+
+/// The same in a closed ring, which is opened at its last port; none if it cannot be opened.
+async fn samples_of_ring(bus: &Bus, segment: &SharedSegment, known: &Rc<Known>) -> Vec<Sample> {
+    let end = Wiring::new(&known.topology, true, |_| true).entries[1];
+    let Some(end) = end.and_then(|end| Some((*known.stations.get(end.node)?, end.port))) else { return Vec::new() };
+    let (own_bus, own) = (bus.clone(), known.clone());
+    while_open(bus, segment, end, async move { samples(&own_bus, &own, Some(Link::Redundant)).await })
+        .await
+        .unwrap_or_default()
+}
+
 /// Receive times of one frame; none of SubDevices without a clock or without an answer.
-async fn sample(bus: &Bus, known: &Known) -> Result<Vec<Option<Latched>>, BusError> {
-    let _latches = latch_anyway(bus).await?;
+async fn sample(bus: &Bus, known: &Known, no_return: Option<Link>) -> Result<Sample, BusError> {
+    let _latches = latch_anyway(bus, no_return).await?;
     let each: Vec<(StationAddress, bool)> =
         known.stations.iter().copied().zip(known.has_clock.iter().copied()).collect();
     let read = bus.gather(each, |bus, (station, clock)| async move {
@@ -211,7 +240,7 @@ fn bytes<const N: usize>(data: Option<&[u8]>) -> [u8; N] {
 }
 
 /// Delays from the first clock, by the mean of latched frames. None unless all cables are measured one by one.
-fn measured(known: &Known, readings: &[Option<Readings>], samples: Vec<Vec<Option<Latched>>>) -> Vec<Option<i64>> {
+fn measured(known: &Known, is_closed: bool, readings: &[Option<Readings>], samples: Vec<Sample>) -> Vec<Option<i64>> {
     let is_open = |at: PortOf| {
         let status = readings.get(at.node).and_then(Option::as_ref).map(|readings| readings.dl_status);
         let port = status.map(|status| status.ports[usize::from(at.port & 3)]);
@@ -219,7 +248,9 @@ fn measured(known: &Known, readings: &[Option<Readings>], samples: Vec<Vec<Optio
     };
     let nothing = vec![None; known.stations.len()];
     let Some(reference) = known.has_clock.iter().position(|clock| *clock) else { return nothing };
-    let wiring = Wiring::new(&known.topology, false, is_open);
+    let mut wiring = Wiring::new(&known.topology, is_closed, is_open);
+    let end: Vec<PortOf> = wiring.entries[1].filter(|_| is_closed).into_iter().collect();
+    wiring.open(&end);
     let mut measurements = Measurements::new(&wiring);
     samples.into_iter().for_each(|sample| measurements.add(sample));
     if measurements.count() == 0 || measurements.disagreement(reference).is_some() {

@@ -44,6 +44,10 @@ pub enum IdleObservation<'a> {
     ReadingBegun(&'a [StationAddress]),
     /// It no longer does.
     ReadingEnded,
+    /// The ring is about to be opened for a measurement: broadcasts show nothing of the segment until it has ended.
+    Measuring,
+    /// The measurement has ended.
+    Measured,
     /// The end of an application begins: broadcasts are followed when it has ended.
     Deactivating,
     /// The end of an application has ended.

@@ -21,6 +21,11 @@ impl Segment {
         self.idle.work != Work::Nothing
     }
 
+    /// Whether the ring is open on purpose, for a measurement.
+    pub fn is_measuring(&self) -> bool {
+        self.idle.work == Work::Measurement
+    }
+
     /// Number of changes that broadcasts have shown; it changes with each.
     pub fn idle_changes(&self) -> u32 {
         self.idle.changes
@@ -53,6 +58,9 @@ impl Segment {
                 for watch in [Watch::Undeclared, Watch::UndeclaredMail, Watch::Idle] {
                     effects.start(Task::Watch(watch));
                 }
+                if self.choices.dictionaries {
+                    effects.start(Task::Watch(Watch::Dictionaries));
+                }
             }
             IdleObservation::Watched(carriers, state) => {
                 self.idle = self.idle.renewed();
@@ -82,6 +90,8 @@ impl Segment {
             }
             IdleObservation::ReadingEnded => self.idle.read(false),
             IdleObservation::SomeRead(read) => self.observe_idle_states(read, now, effects),
+            IdleObservation::Measuring => self.idle.work = Work::Measurement,
+            IdleObservation::Measured => self.idle.end(Work::Measurement),
             IdleObservation::Deactivating => self.idle.work = Work::Deactivation,
             IdleObservation::Deactivated => self.idle.end(Work::Deactivation),
         }
@@ -100,7 +110,7 @@ impl Segment {
     }
 
     fn evaluate_broadcast(&mut self, shown: Broadcast, ring: RingState, now: Instant, effects: &mut Effects) {
-        if self.is_scanning() || self.is_active() {
+        if self.is_scanning() || self.is_active() || self.is_measuring() {
             return;
         }
         self.ring.observe_broadcast(ring, shown.counts(), now, effects);
@@ -113,7 +123,8 @@ impl Segment {
         let Some(scanned) = self.found().map(|found| found.counts()) else {
             if shown.has_answer() {
                 self.begin_scan(false);
-                self.begin_work((Work::FirstScan, Task::ScanSegment), effects);
+                let number = self.scan_number();
+                self.begin_work((Work::FirstScan, Task::ScanSegment { number }), effects);
             }
             return;
         };

@@ -47,7 +47,7 @@ impl Segment {
             RoundWantedIn(pause) => self.attention.again_in(pause, now),
             FramesTested => self.frames_tested_until = now + FRAME_TESTS,
             FramesLimited { versions, limit } => self.limit_frames(versions, limit, effects),
-            ScanBegun => self.begin_scan(true),
+            ScanBegun => self.begin_requested_scan(effects),
             ScanShows { findings, subdevices } => self.report_scan(findings, subdevices, effects),
             Compared(finding) => report_comparison(finding, effects),
             ScanEnded(result) => self.end_scan(result, effects),

@@ -128,6 +128,17 @@ impl Segment {
         })
     }
 
+    /// The next SubDevice, with its attempt, whose object dictionary is to be read: in a state with mail, and not among
+    /// those that were.
+    pub fn dictionary_to_read(&self, read: &[(SubDeviceKey, u32)]) -> Option<(SubDeviceKey, u32)> {
+        self.subdevices.unassigned().find_map(|it| {
+            let upkeep = it.unassigned.upkeep.as_ref().filter(|upkeep| has_mail(upkeep.target))?;
+            let has_one = it.knowledge.info().is_some_and(|info| info.coe.sdo_information());
+            let due = (it.key, upkeep.reached()?);
+            (has_one && !read.contains(&due)).then_some(due)
+        })
+    }
+
     /// Has dictionaries read of SubDevices that are in their states already: those of another owner, and those that
     /// were written since.
     pub(in crate::segment) fn read_open_pdos(&mut self, effects: &mut Effects) {

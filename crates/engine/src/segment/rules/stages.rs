@@ -16,6 +16,14 @@ use crate::segment::subdevices::SubDevices;
 use crate::segment::versions::Versions;
 
 impl Segment {
+    /// The application has requested a scan. One under way ends: it reconnects no link any more.
+    pub(in crate::segment) fn begin_requested_scan(&mut self, effects: &mut Effects) {
+        if self.is_scanning() {
+            self.link_control.restore(effects);
+        }
+        self.begin_scan(true);
+    }
+
     /// A scan begins, by request or of idle operation: it assigns new station addresses.
     pub(in crate::segment) fn begin_scan(&mut self, is_requested: bool) {
         if !self.is_active() {

@@ -35,7 +35,7 @@ impl Idle {
     /// Three SubDevices are known and in PREOP.
     fn kept() -> Idle {
         let mut idle = Idle::unscanned();
-        assert_eq!(idle.broadcast(3, 1), [Effect::Start(Task::ScanSegment)]);
+        assert_eq!(idle.broadcast(3, 1), [Effect::Start(Task::ScanSegment { number: idle.segment.scan_number() })]);
         idle.observe(Observation::ScanEnded(Ok(found(&[1, 2, 3]))));
         idle.seen(IdleObservation::Scanned);
         idle.broadcast(3, 1);

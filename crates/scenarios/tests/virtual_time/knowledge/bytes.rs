@@ -22,9 +22,14 @@ fn written() -> Vec<Vec<u8>> {
     idle_ones.chain(active).chain(clocks).collect()
 }
 
-/// Knowledge of a segment whose clocks were measured.
+/// Knowledge of a segment whose clocks were measured, and of a part of an object dictionary.
 fn clocked(network: Network) -> Vec<u8> {
-    let main_device = idle(network);
+    let mut main_device = idle(network);
+    let servo = Position(0);
+    main_device.subdevice(servo).sdo_info().expect("it has SDO information");
+    main_device.subdevice(servo).sdo_object(0x1018).expect("it is there");
+    main_device.subdevice(servo).sdo_entry(0x1018, 1).expect("it is there");
+    main_device.subdevice(servo).sdo_entry(0x1018, 9).expect_err("it is not there");
     let declaration = automatic(&main_device.subdevices(), CYCLE).with_clocks(ClockConfig::default());
     let mut application = main_device.activate(declaration).map_err(Error::from).expect("it fits");
     settle(&mut application);
