@@ -4,8 +4,10 @@
 mod adoption;
 mod clocks;
 mod collisions;
+mod ethernet;
 mod following;
 mod library;
+mod library_ethernet;
 mod outside_links;
 mod random_runs;
 mod rows;
