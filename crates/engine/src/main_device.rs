@@ -37,6 +37,8 @@ mod mail;
 mod memories;
 mod messages;
 mod options;
+#[cfg(feature = "standby")]
+mod partner_ethernet;
 mod pending;
 mod prepare;
 #[cfg(feature = "standby")]
@@ -212,7 +214,7 @@ impl MainDevice {
             roles,
             role_followed: 0,
             #[cfg(feature = "standby")]
-            standby: options.standby.map(standby::Standby::new),
+            standby: options.standby.map(|standby| standby::Standby::new(standby, &identity, options.links(), now)),
             options,
         };
         main_device.start_reconciler();
@@ -360,11 +362,19 @@ impl MainDevice {
 
     /// Receives a frame of the acyclic half.
     pub fn receive(&mut self, arrived_on: Link, bytes: &[u8], now: Instant) -> Received {
+        #[cfg(feature = "standby")]
+        if self.take_ethernet(bytes, now) {
+            return Received::Taken;
+        }
         self.supervisor.receive(arrived_on, bytes, now)
     }
 
     /// Sends acyclic frames within a byte budget; see [`Supervisor::transmit`].
     pub fn transmit(&mut self, now: Instant, budget: usize, transmit: &mut impl FnMut(Link, &[u8])) -> usize {
+        #[cfg(feature = "standby")]
+        if self.has_ethernet() {
+            return self.transmit_with_ethernet(now, budget, transmit);
+        }
         self.supervisor.transmit(now, budget, transmit)
     }
 

@@ -3,9 +3,16 @@
 //! An INACTIVE MainDevice is a part of the ring of the ACTIVE one: it sends each frame of the ACTIVE on at its other
 //! interface, and back at the same interface if the other one has no link. A mark per interface in the source address
 //! ends the way of each frame. The caller receives and sends; this module decides, and marks the frame in place.
+//!
+//! Ethernet frames of both MainDevices pass in acyclic master frames: [`PartnerEndpoint`].
+
+mod endpoint;
+pub(crate) mod ethernet;
+mod frame_queue;
 
 use core::time::Duration;
 
+pub use endpoint::{ETHERNET_QUEUE, NotQueued, PartnerEndpoint, PartnerTraffic};
 use ringcat_wire::frame::MacAddress;
 use ringcat_wire::source_address::{FORWARDED_ON_MAIN, FORWARDED_ON_REDUNDANT, MacCodec};
 

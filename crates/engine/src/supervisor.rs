@@ -96,6 +96,20 @@ impl Supervisor {
         self.shared.borrow_mut().monitor = RingMonitor::of(ring);
     }
 
+    /// Number of a frame that is sent beside those of procedures.
+    #[cfg(feature = "standby")]
+    pub(crate) fn take_sequence(&mut self) -> Sequence {
+        self.shared.borrow_mut().flights.take_sequence()
+    }
+
+    /// Sets when there is work beside procedures: at a time, and whether a frame is to be sent now.
+    #[cfg(feature = "standby")]
+    pub(crate) fn set_due_beside(&mut self, at: Instant, is_now: bool) {
+        if self.shared.borrow().due_beside != (at, is_now) {
+            self.shared.borrow_mut().due_beside = (at, is_now);
+        }
+    }
+
     /// Attaches the board of the exchange; from now on [`Bus::ring`] returns the ring state that the exchange posts.
     pub fn attach(&mut self, board: Arc<Board>) {
         let shared = &mut *self.shared.borrow_mut();

@@ -239,6 +239,19 @@ impl TapInterface {
         ioctl(&kernel::request_socket()?, libc::SIOCSIFTXQLEN as _, &mut request)
     }
 
+    /// Sets its MTU.
+    ///
+    /// # Errors
+    /// The kernel refuses it.
+    pub fn set_mtu(&self, mtu: u16) -> Result<(), TapError> {
+        let set = || {
+            let mut request = kernel::named(&self.name)?;
+            request.ifr_ifru.ifru_mtu = mtu.into();
+            ioctl(&kernel::request_socket()?, libc::SIOCSIFMTU as _, &mut request)
+        };
+        set().map_err(|errno| TapError::from_errno(&self.name, "setting its MTU", errno))
+    }
+
     /// Takes the oldest frame that the host sent on the interface and returns its length; `None` if there is none. A
     /// frame longer than `room` is truncated.
     pub fn receive(&self, room: &mut [u8]) -> Option<usize> {

@@ -22,6 +22,14 @@ pub trait AcyclicHalf {
     /// Takes a frame of its class that arrived on shared links.
     fn receive(&mut self, link: Link, frame: &[u8], now: Instant);
 
+    /// As INACTIVE on shared links: works on a frame of its class of the ACTIVE, before it is forwarded.
+    #[cfg(feature = "standby")]
+    fn fill(&mut self, link: Link, frame: &mut [u8], now: Instant);
+
+    /// As INACTIVE on shared links: takes an own frame of its class that has come back.
+    #[cfg(feature = "standby")]
+    fn take_returned(&mut self, frame: &[u8], now: Instant);
+
     /// Runs procedures, and sends on shared links as far as the window allows.
     fn work(&mut self, links: &mut impl Links, window: &Window);
 
@@ -88,6 +96,16 @@ impl AcyclicHalf for Inline {
 
     fn receive(&mut self, link: Link, frame: &[u8], now: Instant) {
         self.engine.receive(link, frame, now);
+    }
+
+    #[cfg(feature = "standby")]
+    fn fill(&mut self, link: Link, frame: &mut [u8], now: Instant) {
+        self.engine.fill(link, frame, now);
+    }
+
+    #[cfg(feature = "standby")]
+    fn take_returned(&mut self, frame: &[u8], now: Instant) {
+        self.engine.take_returned(frame, now);
     }
 
     fn work(&mut self, links: &mut impl Links, window: &Window) {

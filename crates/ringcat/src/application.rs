@@ -218,7 +218,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     #[inline(always)]
     fn take_in<P: CycleProbe>(&mut self, now: Instant, probe: &mut P) {
         if self.cyclic.exchange.is_inactive() {
-            return self.cyclic.pass_on(&mut self.links);
+            return self.cyclic.pass_on(&mut self.links, &mut self.acyclic);
         }
         let mut awaits_frames = P::AWAITS_FRAMES && self.cyclic.exchange.awaits_frames();
         loop {

@@ -104,4 +104,8 @@ impl Reads for Engine {
     fn before(&mut self, link: Link, frame: &mut [u8], at: Instant) {
         self.fill(link, frame, at);
     }
+
+    fn own(&mut self, frame: &[u8], at: Instant) {
+        self.take_returned(frame, at);
+    }
 }

@@ -13,8 +13,11 @@
 //! [`Exchange`](crate::Exchange) of its application, which `docs/standby.md` describes.
 
 mod diagnosis;
+mod ethernet;
 #[cfg(feature = "packet")]
 pub mod guard;
+#[cfg(feature = "eoe")]
+mod interface;
 mod joining;
 pub(crate) mod policy;
 mod roles;
@@ -30,13 +33,17 @@ pub use ringcat_engine::main_device::{
     Active, Heard, HeardDiagnosis, Listener, Options as EngineOptions, StandbyOptions,
 };
 pub use ringcat_engine::role::{Partner, RoleCause, RoleControl, RoleRequest};
-pub use ringcat_engine::standby::{Forwarder, NotForwarded, Onward};
+pub use ringcat_engine::standby::{
+    ETHERNET_QUEUE, Forwarder, NotForwarded, NotQueued, Onward, PartnerEndpoint, PartnerTraffic,
+};
 use ringcat_engine::time::Instant;
 pub use ringcat_engine::{Class, class_of};
 use ringcat_wire::frame::MacAddress;
-pub use ringcat_wire::master_frame::{Diagnosis, DomainRecord, NotReady, Stage};
+pub use ringcat_wire::master_frame::{Diagnosis, DomainRecord, ETHERNET_MTU, MAX_ETHERNET, NotReady, Stage};
 pub use ringcat_wire::memory_write::{MemoryWrite, WriteKind};
 
+#[cfg(feature = "eoe")]
+pub use self::interface::{PartnerInterface, PartnerInterfaceError, PartnerInterfaceStatus};
 pub use self::joining::{Joining, Next};
 pub use self::policy::{OnCollision, Policy};
 use crate::links::{Arrived, Links, PerLink, SendOn};
@@ -53,6 +60,9 @@ pub(crate) trait Reads {
 
     /// The same after it was sent on.
     fn after(&mut self, _frame: &[u8]) {}
+
+    /// An own frame of the time as ACTIVE has come back.
+    fn own(&mut self, _frame: &[u8], _at: Instant) {}
 
     /// Whether a link has a carrier, if this object reports it.
     fn is_up(&self, _link: Link) -> bool {
@@ -206,8 +216,10 @@ impl StoreAndForward {
             let back = forwarder.turn_back(frame, received_on, onward)?;
             if links.send(back.link, frame) { Ok(back) } else { Err(NotForwarded::NoLink) }
         });
-        if passed.is_ok() {
-            reader.after(frame);
+        match passed {
+            Ok(_) => reader.after(frame),
+            Err(NotForwarded::Own) => reader.own(frame, now),
+            Err(_) => {}
         }
         self.count(passed, received_on);
     }

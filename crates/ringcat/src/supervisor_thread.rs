@@ -416,6 +416,12 @@ impl AcyclicHalf for SupervisorThread {
 
     fn receive(&mut self, _link: Link, _frame: &[u8], _now: Instant) {}
 
+    #[cfg(feature = "standby")]
+    fn fill(&mut self, _link: Link, _frame: &mut [u8], _now: Instant) {}
+
+    #[cfg(feature = "standby")]
+    fn take_returned(&mut self, _frame: &[u8], _now: Instant) {}
+
     fn work(&mut self, _links: &mut impl Links, _window: &Window) {}
 
     fn wake(&self) -> Instant {

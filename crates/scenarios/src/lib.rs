@@ -39,6 +39,7 @@ pub mod segments;
 pub mod shared_memory;
 pub mod short_runs;
 pub mod start_lists;
+pub mod talk;
 pub mod tampered_links;
 pub mod tap;
 pub mod terminals;

@@ -45,6 +45,8 @@ pub struct Pair {
     states: States,
     traffic: Traffic,
     log: Vec<(Instant, String)>,
+    /// Ethernet frames per cycle of each program that is started.
+    says: usize,
 }
 
 impl Pair {
@@ -68,7 +70,12 @@ impl Pair {
         let (outputs, states) = (Outputs::new(&network, CYCLE), States::new(&network));
         let hosts = TwoHosts::new(network);
         let boards = [Arc::default(), Arc::default()];
-        Pair { seed, hosts, boards, outputs, states, traffic: Traffic::new(CYCLE), log: Vec::new() }
+        Pair { seed, hosts, boards, outputs, states, traffic: Traffic::new(CYCLE), log: Vec::new(), says: 0 }
+    }
+
+    /// Programs that are started from now on have Ethernet to the other one, and send so many frames in each cycle.
+    pub fn let_members_talk(&mut self, frames: usize) {
+        self.says = frames;
     }
 
     /// Starts the program of an ACTIVE MainDevice on a host: it scans, activates, and runs cycles.
@@ -101,12 +108,19 @@ impl Pair {
     /// # Panics
     /// When this takes more than 5 s.
     pub fn of_members(seed: u64, network: Network) -> Pair {
-        let mut pair = Pair::without_programs(seed, network);
-        pair.start_member(Host::First);
-        pair.run_cycles(5);
-        pair.start_member(Host::Second);
-        pair.until_ready(Host::First);
-        pair
+        Pair::without_programs(seed, network).with_members()
+    }
+
+    /// As [`Pair::of_members`], of a pair without programs.
+    ///
+    /// # Panics
+    /// When this takes more than 5 s.
+    pub fn with_members(mut self) -> Pair {
+        self.start_member(Host::First);
+        self.run_cycles(5);
+        self.start_member(Host::Second);
+        self.until_ready(Host::First);
+        self
     }
 
     /// Waits until a host is ACTIVE with all SubDevices in OP, and the other one could take over.
@@ -138,6 +152,7 @@ impl Pair {
     fn start(&mut self, host: Host, phase: Phase, program: fn(HostLinks, &Board)) {
         self.say(format!("{host:?} starts: {phase:?}"));
         let board = Arc::new(Board::new(phase));
+        board.ask_to_say(self.says);
         self.boards[host as usize] = board.clone();
         let started = self.hosts.start(host, move |links| program(links, &board));
         started.unwrap_or_else(|error| panic!("a program cannot be started: {error}"));

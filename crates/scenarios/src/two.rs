@@ -6,6 +6,7 @@
 //! and whether an output goes back to an older value.
 
 mod controller;
+mod talk;
 
 use std::time::Duration;
 
@@ -19,6 +20,7 @@ use ringcat_sim::time::SimTime;
 use ringcat_wire::al::{AlState, AlStatus};
 
 pub use self::controller::{CYCLE, Controller, Declare, Settings};
+pub use self::talk::Talk;
 
 /// Both, and the network.
 pub struct Two {

@@ -60,7 +60,7 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     // both together
     ("main_device", &["order", "declared", "direction", "time", "bell", "link", "queue", "domain", "ring", "board",
         "info", "topology", "ring_status", "config", "plan", "layout", "event", "knowledge", "segment", "exchange",
-        "supervisor", "mail", "request", "junction", "role", "procedures"]),
+        "supervisor", "mail", "request", "junction", "role", "procedures", "standby"]),
 ];
 
 /// The engine's sources.

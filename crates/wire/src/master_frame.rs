@@ -1,4 +1,5 @@
-//! Cyclic master frames: what the two MainDevices of a ring send each other in each cycle (protocol 9.8).
+//! Master frames: what the two MainDevices of a ring send each other, in each cycle (protocol 9.8), and Ethernet frames
+//! between both (protocol 9.12).
 //!
 //! A master frame holds NOP datagrams at ADP 0 and ADO 0x4155 only, so that SubDevices pass it unchanged. Each datagram
 //! is a fragment of one area ([`Area`]): a head ([`FragmentHead`]), then bytes of the area. One direction per area
@@ -6,7 +7,8 @@
 //! where it has put in bytes for the ACTIVE.
 //!
 //! [`fragments_mut`] walks over the fragments of a received frame. The contents of the areas that have a fixed form are
-//! [`Header`], [`SubDeviceRecord`], [`Diagnosis`] and [`Answer`]; the others are bytes of the application.
+//! [`Header`], [`SubDeviceRecord`], [`Diagnosis`] and [`Answer`]; the others are bytes of the application. Acyclic master
+//! frames have areas of their own, with an [`EthernetHead`] each.
 //!
 //! Versions (decision 0130): a later version appends fields and areas, and changes nothing. A reader ignores bytes
 //! behind the fields and areas that it supports; each sender names the oldest version whose readers understand it.
@@ -14,6 +16,7 @@
 mod answer;
 mod cursor;
 mod diagnosis;
+mod ethernet;
 mod fragment;
 mod header;
 mod item;
@@ -28,6 +31,7 @@ use crate::frame::{ETHERCAT_HEADER_LEN, ETHERNET_HEADER_LEN, ETHERTYPE};
 
 pub use answer::{Answer, NotReady, Stage};
 pub use diagnosis::{Diagnosis, DomainRecord};
+pub use ethernet::{ETHERNET_AREA, ETHERNET_MTU, EthernetHead, MAX_ETHERNET, MIN_ETHERNET};
 pub use fragment::{Fragment, FragmentHead, FragmentsMut, MAX_FRAGMENT, fragments_mut, header_of_frame};
 pub use header::{Header, Lengths, Phase};
 pub use item::Item;
@@ -64,10 +68,14 @@ pub enum Area {
     ToInactive,
     /// A part of the knowledge of the segment, another one in each cycle.
     Knowledge,
+    /// An Ethernet frame of the ACTIVE for the INACTIVE, or none; in acyclic master frames.
+    EthernetToInactive,
     /// The answer of the INACTIVE ([`Answer`]); one fragment.
     Answer,
     /// Process data of the INACTIVE for the ACTIVE.
     ToActive,
+    /// Room for an Ethernet frame of the INACTIVE for the ACTIVE; in acyclic master frames.
+    EthernetToActive,
     /// An area of a later version.
     Other(u8),
 }
@@ -82,8 +90,10 @@ impl Area {
             0x04 => Area::Diagnosis,
             0x05 => Area::ToInactive,
             0x06 => Area::Knowledge,
+            0x07 => Area::EthernetToInactive,
             0x81 => Area::Answer,
             0x82 => Area::ToActive,
+            0x83 => Area::EthernetToActive,
             other => Area::Other(other),
         }
     }
@@ -97,8 +107,10 @@ impl Area {
             Area::Diagnosis => 0x04,
             Area::ToInactive => 0x05,
             Area::Knowledge => 0x06,
+            Area::EthernetToInactive => 0x07,
             Area::Answer => 0x81,
             Area::ToActive => 0x82,
+            Area::EthernetToActive => 0x83,
             Area::Other(code) => code,
         }
     }

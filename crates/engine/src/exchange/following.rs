@@ -24,7 +24,8 @@ use self::knowledge::HeardKnowledge;
 pub(crate) use self::outputs::OutputsSeen;
 use crate::board::standby::StandbyWords;
 use crate::link::Link;
-use crate::ring::{Sequence, foreign_frame, is_forwarded};
+use crate::ring::identity::class_of;
+use crate::ring::{Class, Sequence, foreign_frame, is_forwarded};
 use crate::time::Instant;
 
 /// A cycle whose number is this much lower than the newest one belongs to another count: the ACTIVE has begun anew.
@@ -143,7 +144,9 @@ impl Following {
         if !is_master_frame(frame) {
             return false;
         }
-        let Some((sender, sequence)) = foreign_frame(frame).filter(|_| !is_forwarded(frame)) else { return true };
+        // Acyclic ones are taken by the acyclic half.
+        let is_of_cycle = !is_forwarded(frame) && class_of(frame) == Some(Class::Cyclic);
+        let Some((sender, sequence)) = foreign_frame(frame).filter(|_| is_of_cycle) else { return true };
         if *self.sender.get_or_insert(sender) != sender {
             // Another one controls the bus now.
             self.forget();

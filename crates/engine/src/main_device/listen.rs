@@ -20,13 +20,15 @@ impl MainDevice {
         Some(Listener::new(standby.words.clone()))
     }
 
-    /// Takes and fills a received frame of another MainDevice before it is forwarded, without an application: as
-    /// INACTIVE with the options of MainDevice redundancy. Any bytes are allowed. With an application
-    /// [`Exchange::fill`](crate::exchange::Exchange::fill) does that; this function then only notes that a frame came.
+    /// Takes and fills a received frame of another MainDevice before it is forwarded: as INACTIVE with the options of
+    /// MainDevice redundancy. Any bytes are allowed. With an application
+    /// [`Exchange::fill`](crate::exchange::Exchange::fill) does that for frames of the cyclic class; this function then
+    /// takes and fills acyclic master frames, with Ethernet frames between both MainDevices.
     pub fn fill(&mut self, arrived_on: Link, frame: &mut [u8], now: Instant) {
         if self.role() != MainDeviceRole::Inactive {
             return;
         }
+        self.fill_ethernet(frame, now);
         let has_application = self.active().is_some();
         let Some(standby) = &mut self.standby else { return };
         match &mut standby.listener {

@@ -48,6 +48,7 @@ impl MainDevice {
             return Ok(());
         }
         let configuration = Configuration::of(declaration, &self.options);
+        self.set_ethernet_period(layout.home().map_or(Duration::ZERO, |home| layout.domains[home].period));
         let Some(standby) = &mut self.standby else { return Ok(()) };
         let planned = PlannedMasterFrames::new(standby.options.sizes, layout, subdevices.member_count())?;
         (standby.configuration, standby.session) = (configuration, Some(session));

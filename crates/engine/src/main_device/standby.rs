@@ -10,6 +10,10 @@ use super::listener::Listener;
 use super::standby_options::StandbyOptions;
 use crate::board::standby::StandbyWords;
 use crate::event::{CyclicEvent, Event};
+use crate::link::LinkSet;
+use crate::ring::Identity;
+use crate::standby::PartnerEndpoint;
+use crate::standby::ethernet::PartnerEthernet;
 use crate::time::Instant;
 
 /// What a MainDevice has for redundancy.
@@ -34,6 +38,10 @@ pub(super) struct Standby {
     pub publish_at: (Instant, Instant),
     /// What the published knowledge was made from.
     pub published: Option<Marks>,
+    /// Ethernet between both MainDevices.
+    pub ethernet: Option<PartnerEthernet>,
+    /// Its end for the application, until that takes it.
+    pub endpoint: Option<PartnerEndpoint>,
 }
 
 /// Frames of another ACTIVE that have come.
@@ -57,8 +65,11 @@ pub(super) struct Marks {
 }
 
 impl Standby {
-    pub fn new(options: StandbyOptions) -> Standby {
+    pub fn new(options: StandbyOptions, identity: &Identity, links: LinkSet, now: Instant) -> Standby {
         let words: Arc<StandbyWords> = Arc::default();
+        let has_ethernet = options.max_acyclic > 0 && links == LinkSet::Ring;
+        let ethernet = has_ethernet.then(|| PartnerEthernet::new(*identity, options.max_acyclic, now));
+        let (ethernet, endpoint) = ethernet.unzip();
         Standby {
             options,
             listener: Some(Listener::new(words.clone())),
@@ -71,7 +82,15 @@ impl Standby {
             boot_at: Instant(0),
             publish_at: (Instant(0), Instant(0)),
             published: None,
+            ethernet,
+            endpoint,
         }
+    }
+
+    /// Whether Ethernet frames for the other MainDevice wait since it was determined last what is due. Cheap.
+    #[inline]
+    pub fn has_frames(&self) -> bool {
+        self.ethernet.as_ref().is_some_and(PartnerEthernet::has_news)
     }
 }
 

@@ -14,11 +14,21 @@ pub struct StandbyOptions {
     /// Whether all SubDevices are configured again from INIT on after a takeover (warm standby, protocol MR-18). Off by
     /// default: they go on as they are.
     pub goes_through_init: bool,
+    /// Most acyclic master frames per cycle, with Ethernet frames between both MainDevices
+    /// ([`MainDevice::partner_endpoint`](super::MainDevice::partner_endpoint)); at most 16 (protocol AC-03). 0 by
+    /// default: no Ethernet. The ACTIVE sends as many as its own options say, and only if those of the other one are
+    /// not 0 it is answered.
+    pub max_acyclic: u8,
 }
 
 impl Default for StandbyOptions {
     fn default() -> StandbyOptions {
-        StandbyOptions { sizes: MasterSizes::default(), yields_without_links: true, goes_through_init: false }
+        StandbyOptions {
+            sizes: MasterSizes::default(),
+            yields_without_links: true,
+            goes_through_init: false,
+            max_acyclic: 0,
+        }
     }
 }
 
@@ -34,6 +44,13 @@ impl StandbyOptions {
     #[must_use]
     pub const fn with_goes_through_init(mut self, goes: bool) -> StandbyOptions {
         self.goes_through_init = goes;
+        self
+    }
+
+    /// Sets [`StandbyOptions::max_acyclic`].
+    #[must_use]
+    pub const fn with_max_acyclic(mut self, frames: u8) -> StandbyOptions {
+        self.max_acyclic = frames;
         self
     }
 

@@ -8,7 +8,10 @@ impl MainDevice {
     pub fn poll(&mut self, now: Instant) {
         self.supervisor.poll(now);
         #[cfg(feature = "standby")]
-        self.follow_role(now);
+        {
+            self.follow_role(now);
+            self.poll_ethernet(now);
+        }
     }
 
     /// The latest time of the next call of [`MainDevice::poll`].
@@ -23,11 +26,14 @@ impl MainDevice {
         if self.has_role_to_follow() { Instant::default() } else { self.supervisor.due_at() }
     }
 
-    /// Whether the role has changed, or is to change.
+    /// Whether the role has changed, or is to change, or frames for the other MainDevice wait.
     #[cfg(feature = "standby")]
     #[inline(always)]
     fn has_role_to_follow(&self) -> bool {
-        self.standby.is_some() && self.is_role_due()
+        match &self.standby {
+            Some(standby) => self.is_role_due() || standby.has_frames(),
+            None => false,
+        }
     }
 
     #[cfg(not(feature = "standby"))]
@@ -38,9 +44,7 @@ impl MainDevice {
 
     #[cfg(feature = "standby")]
     fn is_role_due(&self) -> bool {
-        match self.active() {
-            Some(_) => self.role_followed != self.roles.changes(),
-            None => self.roles.is_requested(),
-        }
+        let (has_changed, is_requested) = (self.role_followed != self.roles.changes(), self.roles.is_requested());
+        (has_changed || is_requested) && if self.active().is_some() { has_changed } else { is_requested }
     }
 }

@@ -60,6 +60,13 @@ impl Flights {
         self.sequence
     }
 
+    /// Takes the number of a frame that is sent beside the flights.
+    #[cfg(feature = "standby")]
+    pub(super) fn take_sequence(&mut self) -> Sequence {
+        self.sequence = self.sequence.next();
+        self.sequence
+    }
+
     /// The numbers go on behind this one: no frame is on the wire.
     pub(super) fn go_on_from(&mut self, sequence: Sequence) {
         self.sequence = sequence;

@@ -38,6 +38,9 @@ pub(crate) struct Shared {
     /// Link and source address of the last frame of another MainDevice.
     #[cfg(feature = "standby")]
     pub(crate) foreign: Option<(crate::link::Link, ringcat_wire::frame::MacAddress)>,
+    /// When there is work beside procedures, and whether a frame of it is to be sent now.
+    #[cfg(feature = "standby")]
+    pub(crate) due_beside: (Instant, bool),
     pub(crate) events: EventLog,
     pub(crate) transfers: Transfers,
     pub(crate) command_reports: CommandReports,
@@ -88,6 +91,8 @@ impl Shared {
             counters: AcyclicCounters::default(),
             #[cfg(feature = "standby")]
             foreign: None,
+            #[cfg(feature = "standby")]
+            due_beside: (Instant::NEVER, false),
             events: EventLog::default(),
             transfers: Transfers::default(),
             command_reports: CommandReports::default(),
@@ -164,7 +169,10 @@ impl Shared {
             true => self.alone.next_deadline(self.now),
             false => self.outbox.next_deadline(self.now),
         };
-        timer.min(self.flights.next_deadline()).min(queue.unwrap_or(Instant::NEVER))
+        let timer = timer.min(self.flights.next_deadline()).min(queue.unwrap_or(Instant::NEVER));
+        #[cfg(feature = "standby")]
+        let timer = timer.min(self.due_beside.0);
+        timer
     }
 
     /// Whether there is work that does not wait for a time: a datagram to send, or a request to the link layer.
@@ -173,6 +181,10 @@ impl Shared {
     }
 
     pub(crate) fn wants_to_send(&self) -> bool {
+        #[cfg(feature = "standby")]
+        if self.due_beside.1 {
+            return true;
+        }
         match self.alone.is_held() {
             true => self.alone.next_deadline(self.now).is_some(),
             false => self.outbox.is_ready(self.now) || self.debug_messages.are_waiting(),

@@ -3,6 +3,7 @@
 use ringcat_engine::time::Instant;
 
 use super::Cyclic;
+use crate::acyclic::AcyclicHalf;
 use crate::links::Links;
 
 impl Cyclic {
@@ -14,5 +15,5 @@ impl Cyclic {
         false
     }
 
-    pub fn pass_on(&mut self, _links: &mut impl Links) {}
+    pub fn pass_on(&mut self, _links: &mut impl Links, _acyclic: &mut impl AcyclicHalf) {}
 }

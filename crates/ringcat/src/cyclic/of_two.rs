@@ -10,23 +10,33 @@ use ringcat_engine::{Class, class_of};
 use ringcat_wire::master_frame::NotReady;
 
 use super::{Cyclic, States};
+use crate::acyclic::AcyclicHalf;
 use crate::links::Links;
 use crate::of_two::OfTwo;
 use crate::standby::Reads;
 use crate::standby::policy::{Policy, Situation, Watch};
 
-/// The exchange of an INACTIVE, and when the last frame of the other MainDevice arrived.
-struct Following<'a> {
+/// The exchange of an INACTIVE, its acyclic half, and when the last frame of the other MainDevice arrived.
+struct Following<'a, H> {
     exchange: &'a mut Exchange,
+    acyclic: &'a mut H,
     heard_at: &'a mut Option<Instant>,
 }
 
-impl Reads for Following<'_> {
+impl<H: AcyclicHalf> Reads for Following<'_, H> {
     fn before(&mut self, link: Link, frame: &mut [u8], at: Instant) {
         if class_of(frame) == Some(Class::Cyclic) {
             *self.heard_at = Some(at);
+            self.exchange.fill(link, frame, at);
+        } else {
+            self.acyclic.fill(link, frame, at);
         }
-        self.exchange.fill(link, frame, at);
+    }
+
+    fn own(&mut self, frame: &[u8], at: Instant) {
+        if class_of(frame) == Some(Class::Acyclic) {
+            self.acyclic.take_returned(frame, at);
+        }
     }
 
     fn after(&mut self, frame: &[u8]) {
@@ -48,10 +58,10 @@ impl Cyclic {
     }
 
     /// As INACTIVE: takes, fills and forwards the frames that have arrived.
-    pub fn pass_on(&mut self, links: &mut impl Links) {
+    pub fn pass_on(&mut self, links: &mut impl Links, acyclic: &mut impl AcyclicHalf) {
         let Cyclic { exchange, of_two, .. } = self;
         if let Some(forwarder) = &mut of_two.forwarder {
-            forwarder.forward_and_read(links, &mut Following { exchange, heard_at: &mut of_two.heard_at });
+            forwarder.forward_and_read(links, &mut Following { exchange, acyclic, heard_at: &mut of_two.heard_at });
         }
         self.expect_other();
     }

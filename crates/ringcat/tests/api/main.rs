@@ -8,6 +8,8 @@ mod jobs;
 mod junctions;
 mod mailbox;
 mod names;
+#[cfg(feature = "standby")]
+mod partner_interface;
 mod process_data;
 mod protocols;
 mod readiness;

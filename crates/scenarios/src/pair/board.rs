@@ -1,10 +1,12 @@
 //! What a program shows of itself, and the requests to it.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use ringcat::standby::{ForwardingCounters, RoleRequest};
 use ringcat::{Instant, RingState};
+
+use crate::talk::Speaker;
 
 /// What a MainDevice does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -51,6 +53,8 @@ pub struct Seen {
     pub cold_takeovers: u32,
     /// Events of MainDevice redundancy, as text.
     pub events: Vec<String>,
+    /// Ethernet frames to and from the other one.
+    pub talk: Speaker,
 }
 
 impl Seen {
@@ -72,6 +76,8 @@ impl Seen {
 pub struct Board {
     seen: Mutex<Seen>,
     is_asked_to_stop: AtomicBool,
+    /// Ethernet frames per cycle.
+    says: AtomicUsize,
     request: Mutex<Option<RoleRequest>>,
 }
 
@@ -100,6 +106,16 @@ impl Board {
     /// Which.
     pub fn take_request(&self) -> Option<RoleRequest> {
         self.request.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+
+    /// The program is to have Ethernet to the other one, and to send so many frames in each cycle.
+    pub fn ask_to_say(&self, frames: usize) {
+        self.says.store(frames, Ordering::Relaxed);
+    }
+
+    /// How many.
+    pub fn says(&self) -> usize {
+        self.says.load(Ordering::Relaxed)
     }
 
     /// The program is to stop in order.

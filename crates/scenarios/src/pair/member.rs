@@ -4,17 +4,21 @@ use std::ops::Range;
 use std::time::Duration;
 
 use ringcat::simulated::two_hosts::HostLinks;
-use ringcat::standby::{Joining, Next, Policy, StandbyEvent, StandbyOptions};
+use ringcat::standby::{Joining, Next, PartnerEndpoint, Policy, StandbyEvent, StandbyOptions};
 use ringcat::{
-    Application, DomainId, DomainState, Error, Event, MainDevice, MainDeviceRole, Options, ProcessData, Scan,
+    Application, DomainId, DomainState, Error, Event, Links, MainDevice, MainDeviceRole, Options, ProcessData, Scan,
     ScanError, automatic,
 };
+use ringcat_wire::frame::MacAddress;
 
 use super::board::{Board, Phase};
 use super::programs::{CYCLE, outputs_of};
+use crate::talk::Speaker;
 
 /// Cycles without the ACTIVE after which the other one takes over.
 pub const TIME_OUT_CYCLES: u32 = 3;
+/// Acyclic master frames per cycle, with Ethernet.
+const MAX_ACYCLIC: u8 = 4;
 /// How long it listens before it decides again what follows.
 const SLICE: Duration = Duration::from_millis(1);
 /// How long it listens at its start.
@@ -39,6 +43,27 @@ fn run(mut links: HostLinks, board: &Board, listen: Duration) {
     });
 }
 
+/// Ethernet frames to and from the other one.
+struct Talk {
+    endpoint: Option<PartnerEndpoint>,
+    speaker: Speaker,
+}
+
+impl Talk {
+    fn new(main_device: &mut MainDevice<HostLinks>) -> Talk {
+        let MacAddress([.., last]) = main_device.links_mut().addresses().main;
+        let speaker = Speaker::new(last >> 4 & 1, (main_device.now().0 / CYCLE.as_nanos() as u64) as u16);
+        Talk { endpoint: main_device.partner_endpoint(), speaker }
+    }
+
+    fn step(&mut self, board: &Board) {
+        let Some(endpoint) = &mut self.endpoint else { return };
+        self.speaker.listen(endpoint);
+        self.speaker.say(endpoint, board.says());
+        board.note(|seen| seen.talk = self.speaker.clone());
+    }
+}
+
 /// What a cycle has shown.
 struct Shown {
     role: MainDeviceRole,
@@ -49,11 +74,13 @@ struct Shown {
 }
 
 fn exchange(links: HostLinks, board: &Board, listen: Duration) -> Result<(), Error> {
-    let options = Options::default().with_standby(StandbyOptions::default());
+    let most = if board.says() > 0 { MAX_ACYCLIC } else { 0 };
+    let options = Options::default().with_standby(StandbyOptions::default().with_max_acyclic(most));
     let policy = Policy::default().with_time_out(TIME_OUT_CYCLES, Duration::ZERO).with_listen(LISTEN);
-    let main_device = MainDevice::request(links, &options);
+    let mut main_device = MainDevice::request(links, &options);
+    let mut talk = Talk::new(&mut main_device);
     let joining = Joining::begin(&main_device, &policy.with_listen(listen));
-    let mut application = join(main_device, joining, &policy, board)?;
+    let mut application = join(main_device, joining, &policy, board, &mut talk)?;
     application.set_policy(Some(policy));
     let outputs = outputs_of(&application, application.states().len());
     let mut is_running = application.role() == MainDeviceRole::Inactive;
@@ -71,6 +98,7 @@ fn exchange(links: HostLinks, board: &Board, listen: Duration) -> Result<(), Err
             board.note(|seen| seen.begin(phase, data.now()));
             work(data, &outputs)
         });
+        talk.step(board);
         is_running |= application.all_settled() && shown.is_complete;
         // All SubDevices are configured again.
         is_running &= !note(board, &mut application, &shown);
@@ -85,10 +113,12 @@ fn join(
     mut joining: Joining,
     policy: &Policy,
     board: &Board,
+    talk: &mut Talk,
 ) -> Result<Application<HostLinks>, Error> {
     let declare = |scan: &Scan| automatic(&scan.subdevices, CYCLE);
     loop {
         main_device.listen(SLICE)?;
+        talk.step(board);
         match joining.next(&main_device) {
             Next::Follow => return Ok(main_device.follow(declare)?),
             Next::BecomeActive => {

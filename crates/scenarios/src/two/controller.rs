@@ -1,7 +1,8 @@
 //! One of two MainDevices: its engine, its application, and its way to forward.
 
 use ringcat::standby::{
-    Active, Class, EngineOptions, Forwarder, Partner, RoleControl, RoleRequest, StandbyOptions, class_of,
+    Active, Class, EngineOptions, Forwarder, NotForwarded, Partner, PartnerEndpoint, RoleControl, RoleRequest,
+    StandbyOptions, class_of,
 };
 use ringcat::{
     Declaration, Direction, Directory, DomainId, Engine, Exchange, Instant, Link, MainDeviceRole, Scan, SubDeviceId,
@@ -48,6 +49,8 @@ pub struct Controller {
     settings: Settings,
     /// Its acyclic half.
     pub engine: Engine,
+    /// The end of its Ethernet to the other one, with `max_acyclic`.
+    pub endpoint: Option<PartnerEndpoint>,
     control: RoleControl,
     running: Option<Running>,
     forwarder: Forwarder,
@@ -91,8 +94,9 @@ impl Controller {
         let [main, redundant] = addresses(host);
         let mut options = EngineOptions::new(main, Some(redundant));
         options.standby = Some(settings.standby);
-        let engine = Engine::new(options, now);
+        let mut engine = Engine::new(options, now);
         Controller {
+            endpoint: engine.partner_endpoint(),
             control: engine.role_control(),
             host,
             settings,
@@ -228,18 +232,24 @@ impl Controller {
 
     fn pass_on(&mut self, network: &mut Network, link: Link, bytes: &mut [u8], now: Instant, carriers: [bool; 2]) {
         let before = calls();
-        match &mut self.running {
-            Some(running) => running.exchange.fill(link, bytes, now),
-            None => self.engine.fill(link, bytes, now),
+        if self.forwarder.is_of_another(bytes, now) {
+            match &mut self.running {
+                Some(running) if class_of(bytes) == Some(Class::Cyclic) => running.exchange.fill(link, bytes, now),
+                _ => self.engine.fill(link, bytes, now),
+            }
         }
         self.allocations += calls() - before;
-        if let Ok(onward) = self.forwarder.forward(bytes, link, carriers, now) {
-            network.send(self.links()[onward.link.index()], bytes);
-            if let Some(running) = &mut self.running {
-                let before = calls();
-                running.exchange.take_forwarded(bytes);
-                self.allocations += calls() - before;
+        match self.forwarder.forward(bytes, link, carriers, now) {
+            Ok(onward) => {
+                network.send(self.links()[onward.link.index()], bytes);
+                if let Some(running) = &mut self.running {
+                    let before = calls();
+                    running.exchange.take_forwarded(bytes);
+                    self.allocations += calls() - before;
+                }
             }
+            Err(NotForwarded::Own) => self.engine.take_returned(bytes, now),
+            Err(_) => {}
         }
     }
 
@@ -306,6 +316,9 @@ impl Controller {
             (self.changed_at, self.first_frame_at, self.first_data_at) = (Some(now), None, None);
             self.written.clear();
         } else {
+            if changed == Some(MainDeviceRole::Inactive) {
+                self.forwarder = self.forwarder.after_sending(now);
+            }
             self.next_cycle = Instant((self.next_cycle.0 + CYCLE.as_nanos() as u64).max(now.0 + 1));
         }
         let all = (0..*domains).map(DomainId);

@@ -4,9 +4,11 @@
 mod adoption;
 mod clocks;
 mod collisions;
+mod ethernet;
 mod following;
 mod hot_connect;
 mod library;
+mod library_ethernet;
 mod memory_writes;
 mod outside_links;
 mod random_runs;

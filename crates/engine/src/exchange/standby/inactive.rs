@@ -22,7 +22,8 @@ const WHOLE_WITHIN: u64 = 4;
 
 impl Exchange {
     /// Works on a received frame of another MainDevice before it is forwarded: takes and fills master frames (protocol
-    /// FR-08). Any bytes are allowed. As ACTIVE nothing happens.
+    /// FR-08). Any bytes are allowed. As ACTIVE nothing happens. Frames of the acyclic class are for
+    /// [`MainDevice::fill`](crate::main_device::MainDevice::fill).
     pub fn fill(&mut self, arrived_on: Link, frame: &mut [u8], now: Instant) {
         if let Some(state) = self.standby.0.as_deref_mut()
             && state.role == MainDeviceRole::Inactive
