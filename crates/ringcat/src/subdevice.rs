@@ -135,7 +135,7 @@ impl<S: Services> SubDevice<S> {
         W: Future<Output = Result<T, InformationError>> + 'static,
     {
         let SubDevice { services, address, within, .. } = self;
-        services.call(move |engine| {
+        services.call(EngineKey, move |engine| {
             let (known, identity) = (engine.dictionaries(), engine.info(address).map(|info| info.identity));
             start_with_mailbox(engine, address, within, move |mailbox| work(known.of(&mailbox, identity)))
         })

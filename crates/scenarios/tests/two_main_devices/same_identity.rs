@@ -88,7 +88,7 @@ fn a_maindevice_with_the_identity_of_the_active_does_not_join_its_ring() {
         let (ends, ended) = channel();
         // The second one is not there yet.
         hosts.with_network(|network| {
-            Host::Second.links().into_iter().for_each(|link| _ = network.disconnect(link, true));
+            Host::Second.links().into_iter().for_each(|link| network.disconnect(link, true));
         });
         let (first, ms) = (PerLink::new(address(0x11), Some(address(0x12))), Duration::from_millis);
         start(&mut hosts, Host::First, first, ms(10), ends.clone());
