@@ -55,7 +55,7 @@ fn reaches_op(main_device: MainDevice<SimulatedSegment>, declaration: Declaratio
 }
 
 /// The differences of a network on a bus, whose marks are checked on the bus.
-fn compared(network: &LoadedNetwork, types: &[&str]) -> Vec<Difference> {
+fn checked(network: &LoadedNetwork, types: &[&str]) -> Vec<Difference> {
     let (main_device, scan) = scanned(types);
     let differences = network.configuration.differences(found(&scan), &network.stated());
     let is_prevented = differences.iter().any(|it| it.prevents_op);
@@ -78,16 +78,16 @@ fn with(at: usize, kind: &str) -> Vec<&str> {
 #[test]
 fn an_additional_subdevice_prevents_op_where_it_moves_declared_positions() {
     let network = file_of(&BUS, |_| ());
-    assert_eq!(kinds(&compared(&network, &BUS)), []);
+    assert_eq!(kinds(&checked(&network, &BUS)), []);
     let of_places = |differences: Vec<Difference>| kinds(&differences);
     for (at, prevents) in [(0, true), (1, true), (3, true), (4, false)] {
-        assert_eq!(of_places(compared(&network, &with(at, "digital-input-8"))), [(Additional, prevents)], "{at}");
+        assert_eq!(of_places(checked(&network, &with(at, "digital-input-8"))), [(Additional, prevents)], "{at}");
     }
     // One more of a row is the last one of it.
     let row = ["coupler", "digital-output-8", "digital-output-8", "analog-input-4", "servo"];
-    assert_eq!(of_places(compared(&network, &row)), [(Additional, true)]);
+    assert_eq!(of_places(checked(&network, &row)), [(Additional, true)]);
     let two = ["coupler", "digital-input-8", "digital-output-8", "analog-input-4", "servo", "digital-input-8"];
-    assert_eq!(of_places(compared(&network, &two)), [(Additional, true), (Additional, false)]);
+    assert_eq!(of_places(checked(&network, &two)), [(Additional, true), (Additional, false)]);
 }
 
 // covers: network-file
@@ -101,26 +101,26 @@ fn an_additional_subdevice_moves_no_declaration_by_alias() {
     };
     let network = file_of(&types, by_alias);
     let more = ["coupler", "digital-output-8 alias=11", "digital-input-8", "servo alias=12"];
-    assert_eq!(kinds(&compared(&network, &more))[0], (Additional, false));
+    assert_eq!(kinds(&checked(&network, &more))[0], (Additional, false));
     let before = ["digital-input-8", "coupler", "digital-output-8 alias=11", "servo alias=12"];
-    assert_eq!(kinds(&compared(&network, &before))[0], (Additional, true), "the coupler is declared by position");
+    assert_eq!(kinds(&checked(&network, &before))[0], (Additional, true), "the coupler is declared by position");
 }
 
 // covers: network-file
 #[test]
 fn a_missing_subdevice_prevents_op_unless_it_is_optional() {
     let without: Vec<&str> = BUS.iter().copied().filter(|kind| *kind != "digital-output-8").collect();
-    assert_eq!(kinds(&compared(&file_of(&BUS, |_| ()), &without))[0], (Missing, true));
+    assert_eq!(kinds(&checked(&file_of(&BUS, |_| ()), &without))[0], (Missing, true));
     let optional = |file: &mut NetworkFile| file.subdevice[OUTPUTS].optional = true;
     let network = file_of(&BUS, optional);
-    assert_eq!(kinds(&compared(&network, &without)), [(Missing, false)]);
+    assert_eq!(kinds(&checked(&network, &without)), [(Missing, false)]);
     let other = ["coupler", "digital-input-8", "analog-input-4", "servo"];
-    assert_eq!(kinds(&compared(&network, &other)), [(Device, false)], "another device in place of an optional one");
+    assert_eq!(kinds(&checked(&network, &other)), [(Device, false)], "another device in place of an optional one");
     let all = file_of(&BUS, |file| {
         optional(file);
         file.required = Required::All;
     });
-    assert_eq!(kinds(&compared(&all, &without)), [(Missing, true)]);
+    assert_eq!(kinds(&checked(&all, &without)), [(Missing, true)]);
 }
 
 /// The file of a bus with nothing required.
@@ -172,26 +172,26 @@ fn with_nothing_required_no_difference_of_places_prevents_op() {
 #[test]
 fn swapped_subdevices_are_one_difference_that_names_both_places() {
     let network = file_of(&BUS, |_| ());
-    let differences = compared(&network, &["coupler", "analog-input-4", "digital-output-8", "servo"]);
+    let differences = checked(&network, &["coupler", "analog-input-4", "digital-output-8", "servo"]);
     assert_eq!(kinds(&differences), [(Order, true)]);
     let text = "\"digital-output-8\" is at position 2 instead of position 1, and \"analog-input-4\" at position 1 \
                 instead of position 2";
     assert_eq!(differences[0].text, text);
-    let differences = compared(&network, &["coupler", "servo", "analog-input-4", "digital-output-8"]);
+    let differences = checked(&network, &["coupler", "servo", "analog-input-4", "digital-output-8"]);
     assert_eq!(kinds(&differences), [(Order, true)], "{differences:#?}");
     let text = "\"digital-output-8\" is at position 3 instead of position 1, and \"servo\" at position 1 instead of \
                 position 3";
     assert_eq!(differences[0].text, text);
-    let differences = compared(&network, &["coupler", "analog-input-4", "servo", "digital-output-8"]);
+    let differences = checked(&network, &["coupler", "analog-input-4", "servo", "digital-output-8"]);
     assert_eq!(kinds(&differences), [(Order, true)]);
     assert_eq!(differences[0].text, "\"digital-output-8\" is at position 3, the file has it at position 1");
-    let differences = compared(&network, &["digital-output-8", "servo", "analog-input-4"]);
+    let differences = checked(&network, &["digital-output-8", "servo", "analog-input-4"]);
     assert_eq!(kinds(&differences), [(Missing, true), (Order, true)], "{differences:#?}");
     let text = "\"analog-input-4\" and \"servo\" have changed places: they are at positions 2 and 1, the file has them \
                 at positions 2 and 3";
     assert_eq!(differences[1].text, text);
     let optional = file_of(&BUS, |file| file.subdevice[OUTPUTS].optional = true);
-    assert!(!kinds(&compared(&optional, &["coupler", "analog-input-4", "servo", "digital-output-8"]))[0].1);
+    assert!(!kinds(&checked(&optional, &["coupler", "analog-input-4", "servo", "digital-output-8"]))[0].1);
 }
 
 // covers: network-file
@@ -204,20 +204,20 @@ fn another_identity_prevents_op_where_it_is_compared() {
     let declared = |optional: bool| {
         file_of(&own, |file| (file.subdevice[1].serial, file.subdevice[1].optional) = (Some(11), optional))
     };
-    assert_eq!(kinds(&compared(&declared(false), &own)), []);
-    assert_eq!(kinds(&compared(&declared(false), &other)), [(Serial, true)]);
-    assert_eq!(kinds(&compared(&declared(true), &other)), [(Serial, false)]);
+    assert_eq!(kinds(&checked(&declared(false), &own)), []);
+    assert_eq!(kinds(&checked(&declared(false), &other)), [(Serial, true)]);
+    assert_eq!(kinds(&checked(&declared(true), &other)), [(Serial, false)]);
     let revision = |check: CheckRevision| {
         file_of(&own, |file| {
             file.subdevice[1].revision = file.subdevice[1].revision.map(|revision| revision + 1);
             file.subdevice[1].check_revision = check;
         })
     };
-    assert_eq!(kinds(&compared(&revision(CheckRevision::None), &own)), [(Revision, false)]);
-    assert_eq!(kinds(&compared(&revision(CheckRevision::LowEqual), &own)), [(Revision, true)]);
-    assert_eq!(kinds(&compared(&revision(CheckRevision::HighEqual), &own)), [(Revision, false)]);
+    assert_eq!(kinds(&checked(&revision(CheckRevision::None), &own)), [(Revision, false)]);
+    assert_eq!(kinds(&checked(&revision(CheckRevision::LowEqual), &own)), [(Revision, true)]);
+    assert_eq!(kinds(&checked(&revision(CheckRevision::HighEqual), &own)), [(Revision, false)]);
     let identified = file_of(&own, |file| file.subdevice[2].check_identification = Some(5));
-    assert_eq!(kinds(&compared(&identified, &own)), [(Identification, true)]);
+    assert_eq!(kinds(&checked(&identified, &own)), [(Identification, true)]);
 }
 
 /// A change of the entries of the first PDO of a SubDevice.
@@ -234,19 +234,19 @@ fn pdo_entries(subdevice: &mut SubDevice) -> &mut Vec<Entry> {
 #[test]
 fn pdos_that_differ_prevent_op_where_they_cannot_be_written() {
     let longer: fn(&mut Vec<Entry>) = |entries| entries[0].bits += 8;
-    assert_eq!(kinds(&compared(&entries(OUTPUTS, longer), &BUS)), [(Pdos, true)], "without CoE");
-    assert_eq!(kinds(&compared(&entries(ANALOG, longer), &BUS)), [(Pdos, true)], "the SII fixes them");
+    assert_eq!(kinds(&checked(&entries(OUTPUTS, longer), &BUS)), [(Pdos, true)], "without CoE");
+    assert_eq!(kinds(&checked(&entries(ANALOG, longer), &BUS)), [(Pdos, true)], "the SII fixes them");
     // The same length: the SubDevice takes the bits for what it has.
     let other: fn(&mut Vec<Entry>) = |entries| entries[0].index += 1;
-    assert_eq!(kinds(&compared(&entries(OUTPUTS, other), &BUS)), [(Pdos, false)]);
-    assert_eq!(kinds(&compared(&entries(ANALOG, other), &BUS)), [(Pdos, false)]);
+    assert_eq!(kinds(&checked(&entries(OUTPUTS, other), &BUS)), [(Pdos, false)]);
+    assert_eq!(kinds(&checked(&entries(ANALOG, other), &BUS)), [(Pdos, false)]);
     let two: fn(&mut Vec<Entry>) = |entries| entries.iter_mut().take(2).for_each(|entry| entry.index += 1);
-    let differences = compared(&entries(ANALOG, two), &BUS);
+    let differences = checked(&entries(ANALOG, two), &BUS);
     assert_eq!(kinds(&differences), [(Pdos, false)]);
     assert!(differences[0].text.ends_with("; 1 more entry differs"), "{}", differences[0].text);
     // The mapping is written.
     let shorter: fn(&mut Vec<Entry>) = |entries| drop(entries.pop());
-    assert_eq!(kinds(&compared(&entries(DRIVE, shorter), &BUS)), [(Pdos, false)]);
+    assert_eq!(kinds(&checked(&entries(DRIVE, shorter), &BUS)), [(Pdos, false)]);
 }
 
 // covers: network-file
@@ -259,10 +259,10 @@ fn pdos_that_are_left_out_prevent_op_where_the_assignment_cannot_be_written() {
             sync_manager.expect("it has several PDOs").pdo.truncate(count);
         })
     };
-    let differences = compared(&left(1, 8), &types);
+    let differences = checked(&left(1, 8), &types);
     assert_eq!(kinds(&differences), [(Pdos, true)], "{differences:#?}");
     assert!(differences[0].text.contains("; expected a length of 1, got 2"), "{}", differences[0].text);
-    assert_eq!(kinds(&compared(&left(2, 3), &types)), [(Pdos, false)], "it is written");
+    assert_eq!(kinds(&checked(&left(2, 3), &types)), [(Pdos, false)], "it is written");
 }
 
 /// A SyncManager that only the file leaves out keeps its PDOs; a file without any leaves all to the SubDevice.
@@ -271,7 +271,7 @@ fn pdos_that_are_left_out_prevent_op_where_the_assignment_cannot_be_written() {
 fn a_syncmanager_that_the_file_leaves_out_is_a_difference_unless_all_are() {
     let without = |at: usize, kept: usize| {
         let change = |file: &mut NetworkFile| file.subdevice[at].sync_manager.truncate(kept);
-        compared(&file_of(&BUS, change), &BUS)
+        checked(&file_of(&BUS, change), &BUS)
     };
     for (at, count) in [(DRIVE, 2), (ANALOG, 1)] {
         for kept in 0..count {
@@ -286,11 +286,11 @@ fn a_syncmanager_that_the_file_leaves_out_is_a_difference_unless_all_are() {
 #[test]
 fn cables_and_mailboxes_of_a_network_file_do_not_prevent_op() {
     let mailbox = file_of(&BUS, |file| file.subdevice[DRIVE].mailbox.as_mut().expect("CoE").read.length += 2);
-    assert_eq!(kinds(&compared(&mailbox, &BUS)), [(Mailbox, false)]);
+    assert_eq!(kinds(&checked(&mailbox, &BUS)), [(Mailbox, false)]);
     let cable = file_of(&BUS, |file| {
         file.subdevice[ANALOG].plugged_into.as_mut().expect("a cable").port = 3;
     });
-    assert_eq!(kinds(&compared(&cable, &BUS)), [(Cable, false)]);
+    assert_eq!(kinds(&checked(&cable, &BUS)), [(Cable, false)]);
 }
 
 /// An ENI has SyncManagers of its own, which are written.
@@ -345,21 +345,21 @@ fn subdevices_by_alias_that_have_changed_places_are_one_difference() {
             (subdevice.position, subdevice.alias) = (None, Some(alias));
         }
     });
-    assert_eq!(kinds(&compared(&network, &types)), []);
+    assert_eq!(kinds(&checked(&network, &types)), []);
     let mut exchanged = types;
     exchanged.swap(1, 2);
-    let differences = compared(&network, &exchanged);
+    let differences = checked(&network, &exchanged);
     assert_eq!(kinds(&differences), [(Order, false)], "{differences:#?}");
     for part in [&network.file.subdevice[1].name, &network.file.subdevice[2].name, "at positions 2 and 1"] {
         assert!(differences[0].text.contains(part), "{}: {part}", differences[0].text);
     }
     // The one behind the others: those that are declared by position are not at theirs.
     let behind = [types[0], types[2], types[3], types[4], types[1]];
-    let differences = compared(&network, &behind);
+    let differences = checked(&network, &behind);
     assert_eq!(kinds(&differences), [(Order, true)], "{differences:#?}");
     assert!(differences[0].text.contains("is at position 3, the file has it at position 4"), "{}", differences[0].text);
     // Only one of them at another place: the cables of its neighbours are no differences of their own.
     let moved = [types[0], types[2], types[3], types[1], types[4]];
-    let differences = compared(&network, &moved);
+    let differences = checked(&network, &moved);
     assert_eq!(kinds(&differences), [(Cable, false)], "{differences:#?}");
 }
