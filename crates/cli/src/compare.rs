@@ -1,5 +1,6 @@
 //! `ringcat compare`: the network that is there, compared with the one of a file.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -7,8 +8,8 @@ use ringcat::config::{Configuration, FoundNetwork, ObjectNames, Stated};
 use ringcat::eni::EniFile;
 use ringcat::network::LoadedNetwork;
 
-use crate::bus::{BusArguments, Wanted};
-use crate::descriptions::{EsiArgument, complete};
+use crate::bus::{Bus, BusArguments, Wanted};
+use crate::descriptions::{Descriptions, EsiArgument, complete};
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::network::{Compare, Difference};
@@ -57,19 +58,14 @@ struct Declared {
 pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
     let Declared { configuration, mut stated, names: declared } = load(arguments)?;
     let mut descriptions = arguments.esi.open()?;
-    let with_firmware: Vec<(u32, u32)> =
+    let with_firmware: BTreeSet<(u32, u32)> =
         stated.iter().filter(|it| !it.firmware.is_empty()).filter_map(|it| it.device).collect();
+    let declared_pdos = configuration.declared_pdos(&stated);
     let mut bus = arguments.bus.scan(|info| Wanted {
         firmware: with_firmware.contains(&(info.identity.vendor_id, info.identity.product_code)),
-        modules: descriptions.as_mut().is_some_and(|it| it.has_modules(info))
-            || configuration.has_unlisted_pdos(info, &stated),
+        modules: descriptions.as_mut().is_some_and(|it| it.has_modules(info)) || declared_pdos.are_unlisted(info),
     })?;
-    for (info, modules) in bus.scan.subdevices.iter().zip(&bus.modules) {
-        let device = Some((info.identity.vendor_id, info.identity.product_code));
-        if !modules.is_empty() || descriptions.as_mut().is_some_and(|it| it.has_modules(info)) {
-            stated.iter_mut().filter(|it| it.device == device).for_each(|it| it.modular = true);
-        }
-    }
+    mark_modular(&mut stated, &bus, descriptions.as_mut());
     let described = complete(descriptions.as_mut(), &mut bus.scan.subdevices, &bus.modules)?;
     bus.oddities.print(&described);
     let found = &bus.scan.subdevices;
@@ -112,6 +108,19 @@ pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
         Verdict::Failed(format!("{count} from the file, {preventing} of them prevent OP"))
     };
     Ok(Report { verdict, data })
+}
+
+/// Marks the SubDevices of the types that have modules on the bus, or slots in their descriptions.
+fn mark_modular(stated: &mut [Stated], bus: &Bus, mut descriptions: Option<&mut Descriptions>) {
+    let mut modular = BTreeSet::new();
+    for (info, modules) in bus.scan.subdevices.iter().zip(&bus.modules) {
+        if !modules.is_empty() || descriptions.as_mut().is_some_and(|it| it.has_modules(info)) {
+            modular.insert((info.identity.vendor_id, info.identity.product_code));
+        }
+    }
+    for it in stated {
+        it.modular |= it.device.is_some_and(|device| modular.contains(&device));
+    }
 }
 
 fn load(arguments: &CompareArguments) -> Result<Declared, Failure> {

@@ -16,6 +16,7 @@ mod order;
 mod process_data;
 mod properties;
 mod replugged;
+mod unlisted;
 
 use std::collections::BTreeSet;
 
@@ -29,6 +30,7 @@ use align::Place;
 
 pub use difference::{Difference, DifferenceKind, FoundNetwork, Stated, StatedSyncManager};
 pub(crate) use properties::ports;
+pub use unlisted::DeclaredPdos;
 
 impl Configuration {
     /// Names of the SubDevices for messages: name and station address of the file.
@@ -132,15 +134,6 @@ impl Configuration {
             differences.extend(cables::compare(self, &pairs, found, topology));
         }
         differences
-    }
-
-    /// Whether the file assigns PDOs to a SubDevice of this vendor and product that its SII does not list: it may have
-    /// modules in slots ([`Stated::modular`]).
-    pub fn has_unlisted_pdos(&self, found: &SubDeviceInfo, stated: &[Stated]) -> bool {
-        let declared = self.declaration.subdevices.iter().enumerate();
-        declared
-            .filter(|(config, declared)| alike::is_device(declared, stated.get(*config), found))
-            .any(|(_, declared)| process_data::pdos(declared).any(|(_, pdo)| found.pdo(pdo.index).is_none()))
     }
 
     fn missing(&self, config: usize, names: &[String], prevents_op: bool) -> Difference {

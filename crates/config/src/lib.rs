@@ -19,7 +19,7 @@ pub mod network;
 mod object_names;
 mod xml;
 
-pub use compare::{Difference, DifferenceKind, FoundNetwork, Stated, StatedSyncManager};
+pub use compare::{DeclaredPdos, Difference, DifferenceKind, FoundNetwork, Stated, StatedSyncManager};
 pub use configuration::{Configuration, ImageArea, ImageCopy, Notice, ProcessImage, SubDeviceFacts, Variable};
 pub use export::{Export, ExportDetails, ExportError, ExportOptions, LeftOut, LrwUse, SubDeviceDetails, export};
 pub use follow::follow;

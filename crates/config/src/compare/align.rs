@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use ringcat_engine::config::{ConfigAddress, SubDeviceConfig};
 use ringcat_engine::info::SubDeviceInfo;
 
-use super::alike::{Alike, DeviceKey, OWN, device};
+use super::alike::{Alike, DeviceKey, OWN, device, keys_of};
 use super::difference::Stated;
 use super::moves::moves;
 use crate::configuration::Configuration;
@@ -173,8 +173,7 @@ impl ByDevice {
     fn new(found: &[SubDeviceInfo]) -> ByDevice {
         let mut places: BTreeMap<DeviceKey, Vec<usize>> = BTreeMap::new();
         for (at, info) in found.iter().enumerate().rev() {
-            let (vendor, product) = (Some(info.identity.vendor_id), Some(info.identity.product_code));
-            for key in [(vendor, product), (vendor, None), (None, product), (None, None)] {
+            for key in keys_of(info) {
                 places.entry(key).or_default().push(at);
             }
         }

@@ -86,6 +86,12 @@ pub(super) fn device(config: &SubDeviceConfig, stated: Option<&Stated>) -> Devic
     (vendor, config.expected.product_code.or(stated.map(|device| device.1)))
 }
 
+/// What a declaration can say of the device of a found SubDevice.
+pub(super) const fn keys_of(found: &SubDeviceInfo) -> [DeviceKey; 4] {
+    let (vendor, product) = (Some(found.identity.vendor_id), Some(found.identity.product_code));
+    [(vendor, product), (vendor, None), (None, product), (None, None)]
+}
+
 /// Whether a found SubDevice has the vendor and the product of a declared one.
 pub(super) fn is_device(config: &SubDeviceConfig, stated: Option<&Stated>, info: &SubDeviceInfo) -> bool {
     let (vendor, product) = device(config, stated);

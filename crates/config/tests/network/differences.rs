@@ -1,7 +1,8 @@
 //! A network compared with a file: each difference has one message.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use ringcat_config::network::model::{Pdo, SyncManager};
 use ringcat_config::network::{NetworkFile, ScanOptions};
 use ringcat_config::{DifferenceKind, FoundNetwork};
 use ringcat_engine::Topology;
@@ -104,4 +105,27 @@ fn large_different_networks_are_compared_in_bounded_time() {
     let begin = std::time::Instant::now();
     assert!(!differences(&file, &found).is_empty());
     assert!(begin.elapsed() < Duration::from_secs(20), "{:?}", begin.elapsed());
+}
+
+/// Each found SubDevice is looked up by its device: not all declarations are compared with it.
+// covers: network-file
+#[test]
+fn pdos_that_no_eeprom_lists_are_found_in_linear_time() {
+    let count = 40_000;
+    let mut found = bus(&(0..count).collect::<Vec<_>>());
+    let mut file = file_of(&found);
+    for (at, subdevice) in file.subdevice.iter_mut().enumerate() {
+        let pdo = vec![Pdo { index: 0x1A00 + (at % 512) as u16, ..Pdo::default() }];
+        subdevice.sync_manager.push(SyncManager { pdo, ..SyncManager::default() });
+    }
+    let configuration = file.configuration();
+    let begin = Instant::now();
+    let declared = configuration.declared_pdos(&file.stated());
+    assert!(found.iter().all(|info| declared.are_unlisted(info)));
+    assert!(begin.elapsed() < Duration::from_secs(5), "{:?}", begin.elapsed());
+    found[0].identity.product_code = count;
+    assert!(!declared.are_unlisted(&found[0]), "the file has no such device");
+    // A declaration without a product is for any.
+    file.subdevice[1].product = None;
+    assert!(file.configuration().declared_pdos(&file.stated()).are_unlisted(&found[0]));
 }
