@@ -101,13 +101,12 @@ fn name_moves(configs: &[SubDeviceConfig], info_of: &[Option<usize>], moved: &mu
 }
 
 /// Where each SubDevice has its counterpart in the order of positions, each has to be at its position: the file may
-/// have gaps between them.
+/// have gaps between them, and SubDevices that are declared by alias may have moved between them.
 fn exact_positions(configs: &[SubDeviceConfig], info_of: &[Option<usize>], moved: &mut [bool]) {
-    let is_plain = |config: &SubDeviceConfig| by_position(config) && config.group.is_none();
-    if !configs.iter().all(is_plain) || info_of.contains(&None) {
+    if configs.iter().any(|config| config.group.is_some()) || info_of.contains(&None) {
         return;
     }
-    for (config, info) in info_of.iter().enumerate() {
+    for (config, info) in info_of.iter().enumerate().filter(|(config, _)| by_position(&configs[*config])) {
         moved[config] |= *info != Some(position(&configs[config]));
     }
 }

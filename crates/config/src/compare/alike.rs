@@ -66,10 +66,8 @@ impl<'a> Alike<'a> {
 }
 
 fn unit(declared: &SubDeviceConfig, stated: Option<&Stated>) -> Option<Unit> {
-    let stated = stated.and_then(|stated| stated.device);
-    let vendor = declared.expected.vendor_id.or(stated.map(|device| device.0))?;
-    let product = declared.expected.product_code.or(stated.map(|device| device.1))?;
-    Some((vendor, product, declared.expected.serial?))
+    let (vendor, product) = device(declared, stated);
+    Some((vendor?, product?, declared.expected.serial?))
 }
 
 const fn unit_of(info: &SubDeviceInfo) -> Unit {

@@ -48,8 +48,8 @@ impl Both<'_> {
                 add(DifferenceKind::Mailbox, declared.declared.is_some(), text);
             }
         }
-        for (kind, text) in properties::differences(declared, stated, info) {
-            add(kind, false, text);
+        for (kind, prevents_op, text) in properties::differences(declared, stated, info) {
+            add(kind, prevents_op, text);
         }
         self.process_data(differences);
         let mut add = |kind, prevents_op, text: String| differences.push(self.difference(kind, prevents_op, text));

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use ringcat_engine::config::SubDeviceConfig;
 use ringcat_engine::info::SubDeviceInfo;
-use ringcat_wire::register::PortKind;
+use ringcat_wire::register::{PortKind, SyncManagerControl, SyncManagerMode};
 use ringcat_wire::sii::{CoeDetails, MailboxLayout, MailboxProtocols, PhysicalPort};
 
 use super::difference::{DifferenceKind, Stated, StatedSyncManager};
@@ -28,24 +28,23 @@ const FEATURES: [(u8, &str); 3] = [
 /// Mode and direction in the control byte of a SyncManager; an ENI decides the other bits (interrupts, watchdog).
 const MODE: u8 = 0x0F;
 
-/// The differences: kind and text.
-pub(super) fn differences(
-    declared: &SubDeviceConfig,
-    stated: Option<&Stated>,
-    info: &SubDeviceInfo,
-) -> Vec<(DifferenceKind, String)> {
+/// A difference: kind, whether it prevents OP, text.
+type Property = (DifferenceKind, bool, String);
+
+/// The differences.
+pub(super) fn differences(declared: &SubDeviceConfig, stated: Option<&Stated>, info: &SubDeviceInfo) -> Vec<Property> {
     let mut differences = sync_managers(declared, stated, info);
     let Some(stated) = stated else { return differences };
     let boot = info.bootstrap.as_ref().map(buffers);
     if let Some(expected) = stated.boot_mailbox.filter(|expected| boot != Some(*expected)) {
         let text = format!("in BOOT, expected mailboxes {}, got {}", words(Some(expected)), words(boot));
-        differences.push((DifferenceKind::Mailbox, text));
+        differences.push((DifferenceKind::Mailbox, false, text));
     }
     if info.mailbox.is_some() {
         let texts = [of_protocols(stated, info), of_features(stated, info)];
-        differences.extend(texts.into_iter().flatten().map(|text| (DifferenceKind::Protocols, text)));
+        differences.extend(texts.into_iter().flatten().map(|text| (DifferenceKind::Protocols, false, text)));
     }
-    differences.extend(of_ports(stated, info).map(|text| (DifferenceKind::Ports, text)));
+    differences.extend(of_ports(stated, info).map(|text| (DifferenceKind::Ports, false, text)));
     differences
 }
 
@@ -59,41 +58,50 @@ pub(super) fn words(mailbox: Option<[(u16, u16); 2]>) -> String {
     format!("{out:#06x} ({out_length} bytes) and {back:#06x} ({back_length} bytes)")
 }
 
-fn sync_managers(
-    declared: &SubDeviceConfig,
-    stated: Option<&Stated>,
-    info: &SubDeviceInfo,
-) -> Vec<(DifferenceKind, String)> {
+/// Settings that are written, those of an ENI, prevent OP if the SubDevice checks them: it refuses SAFEOP. A controller
+/// without a processor (device emulation) takes any.
+fn sync_managers(declared: &SubDeviceConfig, stated: Option<&Stated>, info: &SubDeviceInfo) -> Vec<Property> {
     let mut differences = Vec::new();
     // Without the category the addresses are not those of the SII.
     if info.sync_managers.is_empty() {
         return differences;
     }
-    for (number, (of, bits)) in expected(declared, stated) {
-        let mut add = |text: String| differences.push((DifferenceKind::SyncManager, format!("SM {number}: {text}")));
+    let is_checked = declared.declared.is_some() && !info.device_emulation;
+    let bits = if declared.declared.is_some() { MODE } else { 0xFF };
+    for (number, of) in expected(declared, stated) {
+        let mut add = |prevents_op: bool, text: String| {
+            differences.push((DifferenceKind::SyncManager, prevents_op, format!("SM {number}: {text}")));
+        };
         let Some(own) = info.sync_managers.get(usize::from(number)) else {
             let count = info.sync_managers.len();
-            add(format!("it is not among the {count} that the SubDevice describes"));
+            add(false, format!("it is not among the {count} that the SubDevice describes"));
             continue;
         };
         if let Some(start) = of.start.filter(|start| *start != own.start) {
-            add(format!("expected address {start:#06x}, got {:#06x}", own.start));
+            add(is_checked, format!("expected address {start:#06x}, got {:#06x}", own.start));
         }
         if let Some(control) = of.control.filter(|control| (control ^ own.control) & bits != 0) {
-            add(format!("expected control byte {control:#04x}, got {:#04x}", own.control));
+            let prevents_op = is_checked && !is_compatible(control, own.control);
+            add(prevents_op, format!("expected control byte {control:#04x}, got {:#04x}", own.control));
         }
     }
     differences
 }
 
-/// SyncManagers with process data by number, with the bits of the control byte that are compared: those that are
-/// written, else those that the file states.
-fn expected(declared: &SubDeviceConfig, stated: Option<&Stated>) -> BTreeMap<u8, (StatedSyncManager, u8)> {
+/// Whether a SubDevice with process data of this mode and direction takes another control byte: three buffers in place
+/// of one, but no other direction.
+fn is_compatible(written: u8, own: u8) -> bool {
+    let [written, own] = [written, own].map(SyncManagerControl::from_bits);
+    written.direction == own.direction && (written.mode == own.mode || written.mode == SyncManagerMode::Buffered)
+}
+
+/// SyncManagers with process data by number: those that are written, else those that the file states.
+fn expected(declared: &SubDeviceConfig, stated: Option<&Stated>) -> BTreeMap<u8, StatedSyncManager> {
     let stated = stated.into_iter().flat_map(|stated| &stated.sync_managers);
-    let mut expected: BTreeMap<u8, (StatedSyncManager, u8)> = stated.map(|of| (of.number, (*of, 0xFF))).collect();
+    let mut expected: BTreeMap<u8, StatedSyncManager> = stated.map(|of| (of.number, *of)).collect();
     for it in declared.declared.iter().flatten().filter(|it| it.area().is_some_and(|area| area.length > 0)) {
         let (start, control) = (Some(it.register.start), Some(it.register.control.bits()));
-        expected.insert(it.index, (StatedSyncManager { number: it.index, start, control }, MODE));
+        expected.insert(it.index, StatedSyncManager { number: it.index, start, control });
     }
     expected
 }

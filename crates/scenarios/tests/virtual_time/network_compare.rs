@@ -298,12 +298,15 @@ fn cables_and_mailboxes_of_a_network_file_do_not_prevent_op() {
 #[test]
 fn differences_from_an_eni_are_judged_by_the_bus_too() {
     type Change = fn(&mut NetworkFile);
-    let changes: [(Change, &[(DifferenceKind, bool)]); 7] = [
+    let changes: [(Change, &[(DifferenceKind, bool)]); 9] = [
         (|_| (), &[]),
         (|file| file.subdevice[DRIVE].mailbox.as_mut().expect("CoE").read.length -= 2, &[(Mailbox, true)]),
         (|file| pdo_entries(&mut file.subdevice[OUTPUTS])[0].bits += 8, &[(Pdos, true)]),
         (|file| drop(pdo_entries(&mut file.subdevice[DRIVE]).pop()), &[(Pdos, false)]),
-        (|file| file.subdevice[DRIVE].sync_manager[0].start = Some(0x1D00), &[(SyncManager, false)]),
+        (|file| file.subdevice[DRIVE].sync_manager[0].start = Some(0x1D00), &[(SyncManager, true)]),
+        (|file| file.subdevice[DRIVE].sync_manager[0].control = Some(0x60), &[(SyncManager, true)]),
+        // A terminal without a processor takes any.
+        (|file| file.subdevice[OUTPUTS].sync_manager[0].start = Some(0x0F08), &[(SyncManager, false)]),
         (
             |file| file.subdevice[DRIVE].mailbox.as_mut().expect("CoE").protocols.push(Protocol::SoE),
             &[(Protocols, false)],
@@ -327,9 +330,9 @@ fn differences_from_an_eni_are_judged_by_the_bus_too() {
 // covers: network-file
 #[test]
 fn subdevices_by_alias_that_have_changed_places_are_one_difference() {
-    let types = ["coupler", "digital-output-8 alias=7", "analog-input-4 alias=8", "servo", "digital-output-8"];
+    let types = ["coupler", "digital-output-8 alias=7", "analog-input-4 alias=8", "servo alias=9", "digital-output-8"];
     let network = file_of(&types, |file| {
-        for (subdevice, alias) in file.subdevice[1..3].iter_mut().zip([7, 8]) {
+        for (subdevice, alias) in file.subdevice[1..4].iter_mut().zip([7, 8, 9]) {
             (subdevice.position, subdevice.alias) = (None, Some(alias));
         }
     });
@@ -341,8 +344,13 @@ fn subdevices_by_alias_that_have_changed_places_are_one_difference() {
     for part in [&network.file.subdevice[1].name, &network.file.subdevice[2].name, "at positions 2 and 1"] {
         assert!(differences[0].text.contains(part), "{}: {part}", differences[0].text);
     }
+    // The one behind the others: those that are declared by position are not at theirs.
+    let behind = [types[0], types[2], types[3], types[4], types[1]];
+    let differences = judged(&network, &behind);
+    assert_eq!(kinds(&differences), [(Order, true)], "{differences:#?}");
+    assert!(differences[0].text.contains("is at position 3, the file has it at position 4"), "{}", differences[0].text);
     // Only one of them at another place: the cables of its neighbours are no differences of their own.
     let moved = [types[0], types[2], types[3], types[1], types[4]];
     let differences = judged(&network, &moved);
-    assert!(differences.iter().all(|it| it.kind != Cable) || differences.len() == 1, "{differences:#?}");
+    assert_eq!(kinds(&differences), [(Cable, false)], "{differences:#?}");
 }
