@@ -107,7 +107,8 @@ impl Configuration {
                             position: Some(found[info].position),
                             kind: DifferenceKind::Order,
                             prevents_op: marks.fails(config)
-                                || order.other(config).is_some_and(|other| marks.fails(other)),
+                                || order.other(config).is_some_and(|other| marks.fails(other))
+                                || order.shifted_with(config).any(|other| marks.fails(other)),
                             text,
                         });
                     }

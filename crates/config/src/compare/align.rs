@@ -106,8 +106,16 @@ fn exact_positions(configs: &[SubDeviceConfig], info_of: &[Option<usize>], moved
     if configs.iter().any(|config| config.group.is_some()) || info_of.contains(&None) {
         return;
     }
-    for (config, info) in info_of.iter().enumerate().filter(|(config, _)| by_position(&configs[*config])) {
-        moved[config] |= *info != Some(position(&configs[config]));
+    let placed = (0..configs.len()).filter(|config| by_position(&configs[*config]));
+    let mut placed: Vec<(usize, usize, usize)> =
+        placed.filter_map(|config| Some((position(&configs[config]), info_of[config]?, config))).collect();
+    placed.sort_unstable();
+    // Of neighbours that are shifted by as much, the first one stands for all.
+    let mut before = 0;
+    for (position, info, config) in placed {
+        let shift = info as isize - position as isize;
+        moved[config] |= shift != 0 && shift != before;
+        before = shift;
     }
 }
 

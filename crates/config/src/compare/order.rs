@@ -59,7 +59,12 @@ impl Order {
                 let (is, said) = (self.behind_on_bus(at, names), self.behind(at.checked_sub(1), names));
                 return Some(format!("\"{name}\" is {is}, the file has it {said}"));
             }
-            return Some(format!("\"{name}\" is at position {bus}, the file has it at position {file}"));
+            let more = match self.shifted_with(config).count() {
+                0 => String::new(),
+                1 => "; the one behind it is shifted by as much".to_owned(),
+                count => format!("; {count} behind it are shifted by as much"),
+            };
+            return Some(format!("\"{name}\" is at position {bus}, the file has it at position {file}{more}"));
         };
         if other < at {
             return None;
@@ -79,6 +84,16 @@ impl Order {
                 partner.bus, partner.file
             )
         })
+    }
+
+    /// The SubDevices behind one that are as far from their positions as it is, up to the first that is not.
+    pub(super) fn shifted_with(&self, config: usize) -> impl Iterator<Item = usize> {
+        let shift = |member: &Member| member.bus as isize - member.file as isize;
+        let at = self.index.get(&config).copied().filter(|at| self.moves[*at].is_none());
+        let own = at.map(|at| shift(&self.declared[at])).filter(|shift| *shift != 0);
+        let behind = self.declared.iter().zip(&self.moves).skip(at.map_or(self.declared.len(), |at| at + 1));
+        let behind = behind.take_while(move |(member, change)| change.is_none() && Some(shift(member)) == own);
+        behind.map(|(member, _)| member.config)
     }
 
     /// The SubDevice with which this one has changed places.

@@ -99,7 +99,7 @@ fn sync_managers_mailboxes_and_domains_of_a_network_file_are_in_its_eni() {
         }
         _ => None,
     });
-    let expected: [Vec<u8>; 6] = [vec![0], vec![0x00, 0x16], vec![1], vec![0], vec![0x00, 0x1A], vec![1]];
+    let expected: [Vec<u8>; 6] = [vec![0], vec![0], vec![0x00, 0x16], vec![1], vec![0x00, 0x1A], vec![1]];
     assert_eq!(assigned.collect::<Vec<_>>(), expected);
     let eni = model(&export.text);
     assert_eq!(eni.main_device.name, "Cell & <4>");
@@ -127,10 +127,10 @@ fn an_assignment_is_cleared_filled_and_counted() {
     });
     let expected = [
         (0x1C12, 0, vec![0]),
+        (0x1C13, 0, vec![0]),
         (0x1C12, 1, vec![0x0A, 0x16]),
         (0x1C12, 2, vec![0x0F, 0x16]),
         (0x1C12, 0, vec![2]),
-        (0x1C13, 0, vec![0]),
         (0x1C13, 1, vec![0x0A, 0x1A]),
         (0x1C13, 0, vec![1]),
     ];

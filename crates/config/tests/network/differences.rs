@@ -91,9 +91,17 @@ fn a_subdevice_with_an_alias_is_found_anywhere() {
     found[0].alias = 8;
     let mut options = ScanOptions::new("machine", Duration::from_millis(1));
     options.by_alias = true;
-    let file = NetworkFile::from_scan(&found, &Topology::default(), &options);
+    let mut file = NetworkFile::from_scan(&found, &Topology::default(), &options);
     let mut moved = bus(&[2, 3, 1]);
     moved[2].alias = 8;
+    // One difference for the two that are not at their positions any more.
+    assert_eq!(differences(&file, &moved), [(Order, Some(1), Some(0))]);
+    for subdevice in &mut file.subdevice {
+        (subdevice.position, subdevice.alias) = (None, Some(subdevice.product.unwrap_or_default() as u16 + 7));
+    }
+    for info in &mut moved {
+        info.alias = info.identity.product_code as u16 + 7;
+    }
     assert_eq!(differences(&file, &moved), []);
 }
 

@@ -304,7 +304,7 @@ fn differences_from_an_eni_are_judged_by_the_bus_too() {
         (|file| pdo_entries(&mut file.subdevice[OUTPUTS])[0].bits += 8, &[(Pdos, true)]),
         (|file| drop(pdo_entries(&mut file.subdevice[DRIVE]).pop()), &[(Pdos, false)]),
         (|file| file.subdevice[DRIVE].sync_manager[0].start = Some(0x1D00), &[(SyncManager, true)]),
-        (|file| file.subdevice[DRIVE].sync_manager[0].control = Some(0x60), &[(SyncManager, true)]),
+        (|file| file.subdevice[DRIVE].sync_manager[0].control = Some(0x66), &[(SyncManager, true)]),
         // A terminal without a processor takes any.
         (|file| file.subdevice[OUTPUTS].sync_manager[0].start = Some(0x0F08), &[(SyncManager, false)]),
         (
