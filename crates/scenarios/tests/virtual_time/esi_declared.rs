@@ -114,7 +114,7 @@ fn chosen_pdos_modules_and_values_are_in_the_devices_in_op() {
     assert_eq!(read(2, 0x8000, 3), 300, "the value that was chosen comes after that of the file");
     assert_eq!([read(3, 0xF030, 0), read(3, 0xF030, 1), read(3, 0xF030, 3)], [3, 0x1_0001, 0x1_0002]);
     assert_eq!(read(3, 0x6060, 0), 8, "the start-up command of the module in slot 0");
-    let target = image.variable("AM01.Outputs.Target position").expect("it is named by the module").clone();
+    let target = image.variable("AM01.csp axis/Outputs.Target position").expect("it is named by the module").clone();
     let lamp = image.variable("AD08.Channels 1 to 4.Output 3").expect("it is named by the file").clone();
     image.write(&target, 0x0403_0201);
     image.write(&lamp, 1);

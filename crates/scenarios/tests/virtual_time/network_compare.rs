@@ -298,15 +298,13 @@ fn cables_and_mailboxes_of_a_network_file_do_not_prevent_op() {
 #[test]
 fn differences_from_an_eni_are_judged_by_the_bus_too() {
     type Change = fn(&mut NetworkFile);
-    let changes: [(Change, &[(DifferenceKind, bool)]); 9] = [
+    let changes: [(Change, &[(DifferenceKind, bool)]); 8] = [
         (|_| (), &[]),
         (|file| file.subdevice[DRIVE].mailbox.as_mut().expect("CoE").read.length -= 2, &[(Mailbox, true)]),
         (|file| pdo_entries(&mut file.subdevice[OUTPUTS])[0].bits += 8, &[(Pdos, true)]),
         (|file| drop(pdo_entries(&mut file.subdevice[DRIVE]).pop()), &[(Pdos, false)]),
         (|file| file.subdevice[DRIVE].sync_manager[0].start = Some(0x1D00), &[(SyncManager, true)]),
         (|file| file.subdevice[DRIVE].sync_manager[0].control = Some(0x66), &[(SyncManager, true)]),
-        // A terminal without a processor takes any.
-        (|file| file.subdevice[OUTPUTS].sync_manager[0].start = Some(0x0F08), &[(SyncManager, false)]),
         (
             |file| file.subdevice[DRIVE].mailbox.as_mut().expect("CoE").protocols.push(Protocol::SoE),
             &[(Protocols, false)],
@@ -314,16 +312,27 @@ fn differences_from_an_eni_are_judged_by_the_bus_too() {
         (|file| file.subdevice[DRIVE].ports = "KKY".to_owned(), &[(Ports, false)]),
     ];
     for (change, expected) in changes {
-        let file = file_of(&BUS, change).file;
-        let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
-        let eni = EniFile::from_bytes(export.text.as_bytes()).unwrap_or_else(|error| panic!("{error}"));
-        let (main_device, scan) = scanned(&BUS);
-        let stated: Vec<Stated> = eni.stated();
-        let differences = eni.configuration.differences(found(&scan), &stated);
-        assert_eq!(kinds(&differences), expected, "{differences:#?}");
-        let is_prevented = differences.iter().any(|it| it.prevents_op);
-        assert_eq!(!is_prevented, reaches_op(main_device, eni.declaration(false)), "{differences:#?}");
+        assert_eq!(of_eni(&BUS, change), expected);
     }
+    // A terminal without a processor takes any address.
+    let types = ["coupler", "emulated-output-8"];
+    assert_eq!(of_eni(&types, |_| ()), []);
+    let moved: Change =
+        |file| file.subdevice[1].sync_manager[0].start = file.subdevice[1].sync_manager[0].start.map(|it| it + 2);
+    assert_eq!(of_eni(&types, moved), [(SyncManager, false)]);
+}
+
+/// The differences of a bus to the ENI of a changed network file, whose marks are checked on the bus.
+fn of_eni(types: &[&str], change: fn(&mut NetworkFile)) -> Vec<(DifferenceKind, bool)> {
+    let file = file_of(types, change).file;
+    let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let eni = EniFile::from_bytes(export.text.as_bytes()).unwrap_or_else(|error| panic!("{error}"));
+    let (main_device, scan) = scanned(types);
+    let stated: Vec<Stated> = eni.stated();
+    let differences = eni.configuration.differences(found(&scan), &stated);
+    let is_prevented = differences.iter().any(|it| it.prevents_op);
+    assert_eq!(!is_prevented, reaches_op(main_device, eni.declaration(false)), "{differences:#?}");
+    kinds(&differences)
 }
 
 /// The place of a SubDevice that is declared by its alias does not count for an activation; the cables show it.
