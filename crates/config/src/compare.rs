@@ -88,8 +88,8 @@ impl Configuration {
     }
 
     /// Every difference between the network of a scan and the file: SubDevices that are missing, additional or at
-    /// another place, revision, serial number, PDOs, mailboxes, SyncManagers, ports, cables. `stated` are the [`Stated`] properties by the
-    /// index of the SubDevice; it may be empty.
+    /// another place, revision, serial number, PDOs, mailboxes, SyncManagers, ports, cables. `stated` are the
+    /// [`Stated`] properties by the index of the SubDevice; it may be empty.
     pub fn differences(&self, network: FoundNetwork<'_>, stated: &[Stated]) -> Vec<Difference> {
         let FoundNetwork { subdevices: found, topology, firmware } = network;
         let names = self.names();

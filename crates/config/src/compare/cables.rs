@@ -20,9 +20,10 @@ use crate::eni::Port;
 const LETTERS: [char; 4] = ['A', 'B', 'C', 'D'];
 
 impl Configuration {
-    /// Cables that differ from those of the file. Two SubDevices that have changed places are one difference, of the kind
-    /// [`DifferenceKind::Order`]; so is one that is at another place. No difference is reported where the cabling is unknown: at missing
-    /// SubDevices, where a ring is open, in rings behind junctions, and while crossed lines make neighbours uncertain.
+    /// Cables that differ from those of the file. Two SubDevices that have changed places are one difference, of the
+    /// kind [`DifferenceKind::Order`]; so is one that is at another place. No difference is reported where the cabling
+    /// is unknown: at missing SubDevices, where a ring is open, in rings behind junctions, and while crossed lines make
+    /// neighbours uncertain.
     pub fn compare_cables(&self, found: &[SubDeviceInfo], topology: &Topology) -> Vec<Difference> {
         let pairs: Vec<(usize, usize)> = resolve(&self.declaration.subdevices, found)
             .into_iter()
