@@ -8,8 +8,8 @@ use ringcat::config::{Configuration, FoundNetwork, ObjectNames, Stated};
 use ringcat::eni::EniFile;
 use ringcat::network::LoadedNetwork;
 
-use crate::bus::{BusArguments, Wanted};
-use crate::descriptions::{EsiArgument, complete};
+use crate::bus::{Bus, BusArguments, Wanted};
+use crate::descriptions::{Descriptions, EsiArgument, complete};
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::network::{Compare, Difference};
@@ -65,15 +65,7 @@ pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
         firmware: with_firmware.contains(&(info.identity.vendor_id, info.identity.product_code)),
         modules: descriptions.as_mut().is_some_and(|it| it.has_modules(info)) || declared_pdos.are_unlisted(info),
     })?;
-    let mut modular = BTreeSet::new();
-    for (info, modules) in bus.scan.subdevices.iter().zip(&bus.modules) {
-        if !modules.is_empty() || descriptions.as_mut().is_some_and(|it| it.has_modules(info)) {
-            modular.insert((info.identity.vendor_id, info.identity.product_code));
-        }
-    }
-    for it in &mut stated {
-        it.modular |= it.device.is_some_and(|device| modular.contains(&device));
-    }
+    mark_modular(&mut stated, &bus, descriptions.as_mut());
     let described = complete(descriptions.as_mut(), &mut bus.scan.subdevices, &bus.modules)?;
     bus.oddities.print(&described);
     let found = &bus.scan.subdevices;
@@ -116,6 +108,19 @@ pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
         Verdict::Failed(format!("{count} from the file, {preventing} of them prevent OP"))
     };
     Ok(Report { verdict, data })
+}
+
+/// Marks the SubDevices of the types that have modules on the bus, or slots in their descriptions.
+fn mark_modular(stated: &mut [Stated], bus: &Bus, mut descriptions: Option<&mut Descriptions>) {
+    let mut modular = BTreeSet::new();
+    for (info, modules) in bus.scan.subdevices.iter().zip(&bus.modules) {
+        if !modules.is_empty() || descriptions.as_mut().is_some_and(|it| it.has_modules(info)) {
+            modular.insert((info.identity.vendor_id, info.identity.product_code));
+        }
+    }
+    for it in stated {
+        it.modular |= it.device.is_some_and(|device| modular.contains(&device));
+    }
 }
 
 fn load(arguments: &CompareArguments) -> Result<Declared, Failure> {
