@@ -8,6 +8,7 @@
 
 mod beating;
 mod counters;
+mod ethernet;
 pub mod guarding;
 mod joining;
 mod news;

@@ -7,8 +7,8 @@
 //! where it has put in bytes for the ACTIVE.
 //!
 //! [`fragments_mut`] walks over the fragments of a received frame. The contents of the areas that have a fixed form are
-//! [`Header`], [`SubDeviceRecord`], [`Diagnosis`] and [`Answer`]; the others are bytes of the application. Acyclic master
-//! frames have areas of their own, with an [`EthernetHead`] each.
+//! [`Header`], [`SubDeviceRecord`], [`Diagnosis`] and [`Answer`]; the others are bytes of the application. Acyclic
+//! master frames have areas of their own, with an [`EthernetHead`] each.
 //!
 //! Versions (decision 0130): a later version appends fields and areas, and changes nothing. A reader ignores bytes
 //! behind the fields and areas that it supports; each sender names the oldest version whose readers understand it.

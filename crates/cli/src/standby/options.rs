@@ -5,6 +5,7 @@ use std::time::Duration;
 use clap::Args;
 use ringcat::standby::Policy;
 
+use super::ethernet::EthernetArguments;
 use super::guarding;
 use crate::interfaces::LinkNames;
 use crate::numbers::number;
@@ -35,6 +36,10 @@ no process data has arrived for --timeout cycles. At its end an ACTIVE hands the
 role over if the other one is ready; otherwise it stops the bus as `ringcat run`
 does. Exit status 1 if something did not hold; the last line reports what.
 
+With --tap on both sides, Ethernet passes between them in acyclic frames:
+  ringcat standby ... --tap rc0
+  ip addr add 192.168.7.1/24 dev rc0; ip link set rc0 up
+
 See docs/standby.md, which begins with a note on patents.";
 
 /// Options of `ringcat standby`.
@@ -52,6 +57,8 @@ pub struct StandbyArguments {
     pub automatic: bool,
     #[command(flatten)]
     pub policy: PolicyArguments,
+    #[command(flatten)]
+    pub ethernet: EthernetArguments,
     /// Age from which frames are not forwarded
     ///
     /// Frames wait where this computer is too busy, or where this program was stopped. They would bring SubDevices back

@@ -10,11 +10,14 @@ use std::time::Duration;
 
 use ringcat::packet::PacketLinks;
 use ringcat::standby::{RoleControl, RoleRequest, StandbyOptions};
-use ringcat::{AlState, CyclicThread, Instant, LastOutputs, MainDeviceRole, Options, SubDeviceState, SupervisorThread};
+use ringcat::{
+    AlState, CyclicThread, Instant, LastOutputs, Links, MainDeviceRole, Options, SubDeviceState, SupervisorThread,
+};
 use ringcat_link::interface;
 
 use super::beating::{BeatingLinks, Beats, Half, HalfLinks};
 use super::counters::{in_line, same_identity};
+use super::ethernet::Ethernet;
 use super::guarding::Guarded;
 use super::joining::{Joined, Joiner};
 use super::news::News;
@@ -53,6 +56,8 @@ struct Controller<'a> {
     guarded: Guarded,
     interfaces: [String; 2],
     news: News,
+    /// The interface that leads to the other MainDevice.
+    ethernet: Option<Ethernet>,
 }
 
 /// Joins the ring, and runs cycles in the role that the policy gives.
@@ -76,11 +81,14 @@ pub fn run(arguments: &StandbyArguments) -> Result<Report, Failure> {
         Guarded::start(arguments.guard, thread.priority, [&names.main, redundant])?
     };
     let beats = Arc::new(Beats::default());
+    let main = cyclic.addresses().main;
     let beating = |links, half| BeatingLinks::new(links, half, guarded.pulse(), guarded.look(), beats.clone());
     let (cyclic, acyclic) = (beating(cyclic, Half::Cyclic), beating(acyclic, Half::Acyclic));
     let _awake = thread.prepare_process();
-    let options = Options::default().with_standby(StandbyOptions::default()).with_pdos(pdos(network.as_ref()));
+    let standby = StandbyOptions::default().with_max_acyclic(arguments.ethernet.max_acyclic());
+    let options = Options::default().with_standby(standby).with_pdos(pdos(network.as_ref()));
     let supervisor = SupervisorThread::start(acyclic, &options, move || thread.prepare_supervisor())?;
+    let ethernet = arguments.ethernet.start(&supervisor, main)?;
     let control = supervisor.role_control()?;
     // Nothing else sets it.
     let _ = beats.role.set(control.clone());
@@ -88,7 +96,8 @@ pub fn run(arguments: &StandbyArguments) -> Result<Report, Failure> {
     let begin = now();
     let until = arguments.lasts.map_or(Instant::NEVER, |lasts| begin + lasts);
     let news = News::new(begin);
-    let controller = Controller { arguments, end, until, supervisor, control, beats, guarded, interfaces, news };
+    let controller =
+        Controller { arguments, end, until, supervisor, control, beats, guarded, interfaces, news, ethernet };
     controller.run(network.map(Arc::new), cyclic)
 }
 
@@ -132,6 +141,14 @@ impl Controller<'_> {
         self.end.is_asked() || now() >= self.until || self.beats.has_acted.load(Ordering::Relaxed)
     }
 
+    /// Prints what has happened.
+    fn show_news(&mut self) {
+        self.news.report(&self.supervisor, now());
+        if let Some(ethernet) = &mut self.ethernet {
+            ethernet.report(&self.news, now());
+        }
+    }
+
     /// Why it ends, in words.
     fn cause(&self) -> String {
         self.end.by().map_or_else(|| "the time was over".to_owned(), |by| format!("ended by {by}"))
@@ -141,7 +158,7 @@ impl Controller<'_> {
     fn await_joined(&mut self, joining: JoinHandle<Result<Joined, Failure>>) -> Result<Option<Joined>, Failure> {
         let mut limit = None;
         while !joining.is_finished() {
-            self.news.report(&self.supervisor, now());
+            self.show_news();
             if self.is_over() {
                 let is_late = now() >= *limit.get_or_insert_with(|| now() + BRING_UP_LIMIT);
                 if is_late
@@ -163,7 +180,7 @@ impl Controller<'_> {
     fn watch(&mut self, joined: &mut Joined) {
         let mut in_op = false;
         while !self.is_over() && !joined.cycles.has_ended() {
-            self.news.report(&self.supervisor, now());
+            self.show_news();
             joined.watched.changes(now()).iter().for_each(|line| self.news.say(now(), line));
             let settled = self.supervisor.all_settled();
             if settled && !in_op {
@@ -236,6 +253,7 @@ impl Controller<'_> {
         reasons.extend(self.news.reasons());
         reasons.extend(same_identity(&counters));
         say!("{}", in_line(&counters));
+        self.ethernet.iter().for_each(Ethernet::summary);
         let role = if role == MainDeviceRole::Active { "active" } else { "inactive" };
         Ok(self.report(reasons, &Standby::from(&counters), role))
     }

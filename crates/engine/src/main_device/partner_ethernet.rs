@@ -20,8 +20,8 @@ impl MainDevice {
         self.standby.as_mut()?.endpoint.take()
     }
 
-    /// A copy of an own frame has come back after the role has become INACTIVE: takes an Ethernet frame in it. Any bytes
-    /// are allowed.
+    /// A copy of an own frame has come back after the role has become INACTIVE: takes an Ethernet frame in it. Any
+    /// bytes are allowed.
     pub fn take_returned(&mut self, bytes: &[u8], now: Instant) {
         self.take_ethernet(bytes, now);
     }

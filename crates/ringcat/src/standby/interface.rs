@@ -1,8 +1,8 @@
 //! A network interface of this host that leads to the other MainDevice (protocol 9.12).
 //!
-//! [`SupervisorThread::start_partner_interface`] makes it; from then on the thread of the acyclic half moves its frames,
-//! before an application begins, while it runs, and in both roles. It has a carrier while the other MainDevice answers.
-//! The administrator of the host gives it an address, and switches it on.
+//! [`SupervisorThread::start_partner_interface`] makes it; from then on the thread of the acyclic half moves its
+//! frames, before an application begins, while it runs, and in both roles. It has a carrier while the other MainDevice
+//! answers. The administrator of the host gives it an address, and switches it on.
 
 use std::error::Error as StdError;
 use std::fmt;

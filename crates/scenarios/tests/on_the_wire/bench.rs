@@ -195,6 +195,12 @@ impl Bench {
         ip(&format!("-n {} {arguments}", self.main)).expect("a namespace of ours");
     }
 
+    /// Changes the network of the third namespace.
+    pub fn ip_elsewhere(&self, arguments: &str) {
+        let other = self.other.as_ref().expect("there is one");
+        ip(&format!("-n {other} {arguments}")).expect("a namespace of ours");
+    }
+
     /// The interfaces of the MainDevice's namespace, a line each.
     pub fn links_main(&self) -> String {
         let output = Command::new("ip").args(["-n", &self.main, "-o", "link"]).output().expect("ip starts");
@@ -215,8 +221,7 @@ impl Bench {
 
     /// Switches an interface in the third namespace.
     pub fn set_link_elsewhere(&self, interface: &str, state: &str) {
-        let other = self.other.as_ref().expect("there is one");
-        ip(&format!("-n {other} link set {interface} {state}")).expect("the interface is there");
+        self.ip_elsewhere(&format!("link set {interface} {state}"));
     }
 
     /// Starts a program in the simulator's namespace.

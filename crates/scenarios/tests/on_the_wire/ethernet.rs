@@ -29,7 +29,7 @@ const INTERFACES: [&str; 2] = ["eoe0s1", "eoe0a7"];
 const LIMIT: Duration = Duration::from_secs(10);
 /// Pings an address, downloads bytes from its web server, or has bytes echoed; prints the duration. Standard library
 /// only.
-const CLIENT: &str = "
+pub const CLIENT: &str = "
 import socket, struct, sys, threading, time
 def checksum(data):
     total = sum(struct.unpack('!%dH' % (len(data) // 2), data))
@@ -94,7 +94,7 @@ for word in sys.argv[1:]:
 ";
 
 /// Whether this machine has TAP interfaces; prints a line if not.
-fn has_taps() -> bool {
+pub fn has_taps() -> bool {
     let there = OpenOptions::new().read(true).write(true).open("/dev/net/tun").is_ok();
     if !there {
         println!("skipped: /dev/net/tun cannot be opened");

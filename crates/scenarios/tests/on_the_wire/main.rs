@@ -27,6 +27,7 @@ mod messages;
 mod running;
 mod said;
 mod takeover;
+mod taps;
 
 use std::process::Output;
 

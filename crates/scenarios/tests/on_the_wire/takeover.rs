@@ -18,16 +18,18 @@ const LIMIT: Duration = Duration::from_secs(20);
 const ROLE: [&str; 6] = ["--listen", "300ms", "--timeout", "10", "--guard", "40ms"];
 const AUTOMATIC: [&str; 3] = ["--automatic", "--cycle", "5ms"];
 const TAKEN_OVER: &str = "taken over: 10 SubDevices go on as they are";
-const READY: &str = "the other MainDevice: ready";
+pub const READY: &str = "the other MainDevice: ready";
 
 /// Two controllers at a simulated ring of 10.
-struct Pair {
-    bench: Bench,
+pub struct Pair {
+    /// The bench.
+    pub bench: Bench,
     declared: Vec<String>,
 }
 
 impl Pair {
-    fn new() -> Option<Pair> {
+    /// On interfaces, if the machine allows it.
+    pub fn new() -> Option<Pair> {
         let mut bench = Bench::new(2)?;
         bench.add_second_main_device();
         bench.simulate(&RING_OF_10.segment(), true);
@@ -40,11 +42,13 @@ impl Pair {
         [&links[..], &declared, &ROLE, more].concat()
     }
 
-    fn first(&self, more: &[&str]) -> Running {
+    /// Starts the first one.
+    pub fn first(&self, more: &[&str]) -> Running {
         self.bench.run_ringcat(&self.arguments(["main0", "active1"], more))
     }
 
-    fn second(&self, more: &[&str]) -> Running {
+    /// Starts the second one.
+    pub fn second(&self, more: &[&str]) -> Running {
         self.bench.run_other_ringcat(&self.arguments(["second0", "main1"], more))
     }
 
@@ -57,18 +61,19 @@ impl Pair {
         (first, second)
     }
 
-    fn all_are_in(&self, state: &str) {
+    /// All SubDevices are in this state.
+    pub fn all_are_in(&self, state: &str) {
         assert_eq!(states(&self.bench, state), 10, "{}", self.bench.order("status"));
     }
 }
 
 /// Waits until a controller has said this.
-fn await_words(controller: &Running, words: &str) {
+pub fn await_words(controller: &Running, words: &str) {
     await_that(words, &[controller], || controller.said().so_far().contains(words));
 }
 
 /// Waits until something holds.
-fn await_that(what: &str, controllers: &[&Running], holds: impl Fn() -> bool) {
+pub fn await_that(what: &str, controllers: &[&Running], holds: impl Fn() -> bool) {
     let until = Instant::now() + LIMIT;
     while !holds() {
         if Instant::now() >= until {
@@ -80,7 +85,7 @@ fn await_that(what: &str, controllers: &[&Running], holds: impl Fn() -> bool) {
 }
 
 /// Ends a controller in order, which says all of this.
-fn end(controller: Running, words: &[&str]) {
+pub fn end(controller: Running, words: &[&str]) {
     let (said, errors) = controller.interrupt();
     assert!(words.iter().all(|words| said.contains(words)), "{words:?}: {said}{errors}");
 }

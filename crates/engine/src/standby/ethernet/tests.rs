@@ -8,10 +8,11 @@ use ringcat_wire::frame::MacAddress;
 use ringcat_wire::master_frame::MAX_ETHERNET;
 use ringcat_wire::source_address::{FORWARDED_ON_MAIN, MacCodec};
 
-use super::*;
+use super::PartnerEthernet;
 use crate::link::{Link, LinkSet};
-use crate::ring::Sequence;
-use crate::standby::endpoint::NotQueued;
+use crate::ring::{Identity, Sequence};
+use crate::standby::endpoint::{ETHERNET_QUEUE, NotQueued, PartnerEndpoint};
+use crate::time::Instant;
 
 const MS: u64 = 1_000_000;
 /// There is no window.
