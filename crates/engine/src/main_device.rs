@@ -108,7 +108,7 @@ use crate::mail::eoe::EthernetPort;
 use crate::mail::relay::GatewayQueue;
 use crate::mail::{EmergencyRings, InUse};
 use crate::procedures::error_statistics::ErrorStatistics;
-use crate::procedures::loops::restore;
+use crate::procedures::loops::restore_within;
 use crate::procedures::own_objects::OwnObjects;
 use crate::procedures::reconcile::{Companions, reconcile_without_application};
 use crate::procedures::scan::ScanError;
@@ -238,8 +238,8 @@ impl MainDevice {
         self.end_application(now);
         let (bus, segment, slot) = (self.supervisor.bus(), self.segment.clone(), self.stopped.clone());
         self.supervisor.spawn(async move {
-            restore(&bus, &segment).await;
-            let result = stop(&bus, to_stop, state, limit).await;
+            let left = restore_within(&bus, &segment, limit).await;
+            let result = stop(&bus, to_stop, state, left).await;
             *slot.borrow_mut() = Some(result);
         });
     }

@@ -86,7 +86,7 @@ const WAITS: [(&str, &[Reason]); 42] = [
 ];
 
 /// By file, each wait for an event with a limit (`Bus::within`), in its order. In a loop the limit is a period.
-const WITHIN: [(&str, &[Reason]); 17] = [
+const WITHIN: [(&str, &[Reason]); 19] = [
     ("mail/conversation.rs", &[Limit, Limit, Limit]),
     ("mail/mailbox.rs", &[Limit]),
     ("mail/reader.rs", &[Register]),
@@ -99,10 +99,12 @@ const WITHIN: [(&str, &[Reason]); 17] = [
     ("procedures/idle/rescue.rs", &[Limit]),
     // What has been read so far is used in each pause.
     ("procedures/inspect.rs", &[Pace]),
+    ("procedures/loops.rs", &[Limit]),
     ("procedures/recover.rs", &[Retry]),
     ("procedures/request_states.rs", &[Limit]),
     ("procedures/serve_requests.rs", &[Limit]),
     ("procedures/services/statistics.rs", &[Cyclic]),
+    ("procedures/services/open_ring.rs", &[Limit]),
     ("procedures/shared_segment.rs", &[Limit, Limit]),
     ("procedures/undeclared/keep.rs", &[Retry]),
 ];

@@ -25,6 +25,9 @@ const TYPE: &str = "Mailbox";
 /// Functions without a method of the handle, with the reason.
 #[rustfmt::skip]
 const EXEMPT: &[(&str, &str)] = &[
+    ("Dictionaries::of", "`sdo_object` and `sdo_entry` pass the mailbox: `ask_dictionary`"),
+    ("information::object", "`sdo_object`, of the type where it is known"),
+    ("information::entry", "`sdo_entry`, of the type where it is known"),
     ("Mailbox::bus", "the handle has the limit of a service, other tasks are those of the engine"),
     ("Mailbox::conversation", "messages one by one, as procedures of the engine need them: `raw` is for applications"),
     ("Mailbox::emergencies", "a service of the MainDevice: the ring exists before the mailbox"),

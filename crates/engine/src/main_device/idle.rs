@@ -7,7 +7,7 @@ use core::time::Duration;
 use super::MainDevice;
 use crate::declared::Address;
 use crate::procedures::deactivate::{Remainder, deactivate};
-use crate::procedures::loops::restore;
+use crate::procedures::loops::restore_within;
 use crate::procedures::scan::ScanOptions;
 use crate::procedures::services::ServiceError;
 use crate::role::{Function, MainDevicePhase, MainDeviceRole};
@@ -105,8 +105,8 @@ impl MainDevice {
             segment.observe_idle(IdleObservation::Begun);
         }
         self.supervisor.spawn(async move {
-            restore(&bus, &segment).await;
-            let result = deactivate(&bus, &segment, &options, remainder, limit).await;
+            let left = restore_within(&bus, &segment, limit).await;
+            let result = deactivate(&bus, &segment, &options, remainder, left).await;
             *slot.borrow_mut() = Some(result);
             if is_kept {
                 segment.observe_idle(IdleObservation::Deactivated);

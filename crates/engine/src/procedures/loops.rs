@@ -98,6 +98,16 @@ pub(crate) async fn restore(bus: &Bus, segment: &SharedSegment) {
     segment.observe(Observation::PortsAltered(&[]));
 }
 
+/// Restores ports at the end of an application, within a quarter of its limit: lost frames must not take the time of
+/// the states. What is left of the limit.
+pub(crate) async fn restore_within(bus: &Bus, segment: &SharedSegment, limit: Duration) -> Duration {
+    let begun = bus.now();
+    if bus.within(limit / 4, restore(bus, segment)).await.is_err() {
+        segment.observe(Observation::PortsAltered(&[]));
+    }
+    limit.saturating_sub(bus.now().since(begun))
+}
+
 /// The same settings of a SubDevice, with these of its ports closed for a moment.
 pub(super) fn closed_at(control: DlControl, station: StationAddress, ports: &[(StationAddress, u8)]) -> DlControl {
     let mut loops = control.loops;
