@@ -6,6 +6,7 @@
 use core::fmt;
 
 use ringcat_wire::address::Position;
+use ringcat_wire::memory_write::{MemoryWrite, WriteKind};
 
 /// Index of a SubDevice in the declaration, from 0. It stays the same wherever the SubDevice is on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -22,6 +23,16 @@ pub enum Address {
     Declared(SubDeviceId),
     /// Position on the bus at the last scan; valid before a declaration is active.
     Scanned(Position),
+}
+
+impl Address {
+    /// A write into the memory of this SubDevice.
+    pub(crate) fn memory_write(self, kind: WriteKind) -> MemoryWrite {
+        match self {
+            Address::Declared(subdevice) => MemoryWrite::new(kind, false, subdevice.0),
+            Address::Scanned(position) => MemoryWrite::new(kind, true, usize::from(position.0)),
+        }
+    }
 }
 
 /// A declared SubDevice that is at another position than before.

@@ -107,7 +107,7 @@ impl Mailbox {
 
     /// Notes that a write into the memory of the SubDevice is under way, until what is returned is dropped.
     pub(super) fn begin_memory_write(&self, kind: WriteKind) -> UnderWayWrite {
-        self.shared.bus.begin_memory_write(kind, self.shared.subdevice.get())
+        self.shared.bus.begin_memory_write(self.shared.subdevice.get().memory_write(kind))
     }
 
     /// Waits until a lane is free, and takes it.

@@ -227,7 +227,7 @@ impl MainDevice {
         let subdevice: Address = subdevice.into();
         self.start_on(Function::Eeprom, subdevice, move |bus, station| async move {
             let _turn = eeproms.take(station).await;
-            let _write = bus.begin_memory_write(WriteKind::Eeprom, subdevice);
+            let _write = bus.begin_memory_write(subdevice.memory_write(WriteKind::Eeprom));
             let written = program::write(&bus, station, &image, force).await;
             cache.clear();
             written
@@ -246,7 +246,7 @@ impl MainDevice {
         let subdevice: Address = subdevice.into();
         self.start_on(Function::Eeprom, subdevice, move |bus, station| async move {
             let _turn = eeproms.take(station).await;
-            let _write = bus.begin_memory_write(WriteKind::Eeprom, subdevice);
+            let _write = bus.begin_memory_write(subdevice.memory_write(WriteKind::Eeprom));
             let written = program::write_alias(&bus, station, alias, force).await;
             cache.clear();
             written

@@ -17,7 +17,7 @@ use ringcat_wire::address::{Position, RegisterAddress, StationAddress, Wkc};
 use ringcat_wire::al::{AlStatus, AlStatusCode};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
-use ringcat_wire::memory_write::WriteKind;
+use ringcat_wire::memory_write::MemoryWrite;
 
 use super::counters::AcyclicCounters;
 use super::memory_writes::UnderWayWrite;
@@ -26,7 +26,6 @@ use super::shared_cell::SharedCell;
 use super::signal::Signal;
 use super::transfer::Request;
 use crate::board::Board;
-use crate::declared::Address;
 use crate::event::history::History;
 use crate::event::{Event, Notice, Occupant, Subject};
 use crate::link::{LinkOrder, LinkSet};
@@ -53,8 +52,8 @@ impl Bus {
 
     /// Notes that a write into the memory of a SubDevice is under way, until what is returned is dropped: meanwhile the
     /// role is not given up.
-    pub(crate) fn begin_memory_write(&self, kind: WriteKind, subdevice: Address) -> UnderWayWrite {
-        self.shared.borrow().memory_writes.begin(kind, subdevice)
+    pub(crate) fn begin_memory_write(&self, write: MemoryWrite) -> UnderWayWrite {
+        self.shared.borrow().memory_writes.begin(write)
     }
 
     /// The links the MainDevice has.

@@ -4,9 +4,7 @@ use alloc::rc::Rc;
 use alloc::vec::Vec;
 use core::cell::RefCell;
 
-use ringcat_wire::memory_write::{MemoryWrite, WriteKind};
-
-use crate::declared::Address;
+use ringcat_wire::memory_write::MemoryWrite;
 
 /// The writes, the oldest first.
 #[derive(Clone, Debug, Default)]
@@ -14,12 +12,7 @@ pub(crate) struct MemoryWrites(Rc<RefCell<Vec<MemoryWrite>>>);
 
 impl MemoryWrites {
     /// A write begins; it ends when what is returned is dropped.
-    pub(crate) fn begin(&self, kind: WriteKind, subdevice: Address) -> UnderWayWrite {
-        let (is_position, number) = match subdevice {
-            Address::Declared(subdevice) => (false, subdevice.0),
-            Address::Scanned(position) => (true, usize::from(position.0)),
-        };
-        let write = MemoryWrite::new(kind, is_position, number);
+    pub(crate) fn begin(&self, write: MemoryWrite) -> UnderWayWrite {
         self.0.borrow_mut().push(write);
         UnderWayWrite { writes: self.clone(), write }
     }
@@ -50,21 +43,21 @@ impl Drop for UnderWayWrite {
 
 #[cfg(test)]
 mod tests {
-    use ringcat_wire::address::Position;
+    use ringcat_wire::memory_write::WriteKind;
 
     use super::*;
-    use crate::declared::SubDeviceId;
 
     // covers: standby, 9.6
     #[test]
     fn a_write_is_under_way_until_its_guard_is_dropped() {
         let writes = MemoryWrites::default();
         assert_eq!(writes.oldest(), None);
-        let file = writes.begin(WriteKind::File, SubDeviceId(3).into());
-        let eeprom = writes.begin(WriteKind::Eeprom, Position(9).into());
-        assert_eq!(writes.oldest(), Some(MemoryWrite::new(WriteKind::File, false, 3)));
+        let [first, second] = [(WriteKind::File, false, 3), (WriteKind::Eeprom, true, 9)];
+        let [first, second] = [first, second].map(|(kind, at, number)| MemoryWrite::new(kind, at, number));
+        let [file, eeprom] = [first, second].map(|write| writes.begin(write));
+        assert_eq!(writes.oldest(), Some(first));
         drop(file);
-        assert_eq!(writes.oldest(), Some(MemoryWrite::new(WriteKind::Eeprom, true, 9)));
+        assert_eq!(writes.oldest(), Some(second));
         drop(eeprom);
         assert_eq!(writes.oldest(), None);
     }

@@ -171,8 +171,8 @@ impl<L: Links> MainDevice<L> {
     /// ```
     ///
     /// # Errors
-    /// There is no redundant link; the ACTIVE has the identity of this MainDevice ([`SameIdentity`](super::SameIdentity)); as
-    /// [`MainDevice::follow`] and [`MainDevice::bring_up`].
+    /// There is no redundant link; the ACTIVE has the identity of this MainDevice
+    /// ([`SameIdentity`](super::SameIdentity)); as [`MainDevice::follow`] and [`MainDevice::bring_up`].
     pub fn join(
         mut self,
         policy: &Policy,

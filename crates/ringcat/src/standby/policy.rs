@@ -292,7 +292,7 @@ mod tests {
         assert_eq!(watch(policy).decide(&alone, Instant(MS)), None);
     }
 
-    // covers: standby, MR-10, seed 000 3.7
+    // covers: standby, MR-10, MR-17
     #[test]
     fn of_two_active_the_one_that_writes_into_a_memory_stays() {
         let decide = |policy: Policy, last, writes, other_writes| {

@@ -19,7 +19,7 @@ use crate::time::Instant;
 
 /// Acyclic frames of the ACTIVE before may be read for this time after it has handed its role over.
 const LAST_FRAMES_NS: u64 = 100_000_000;
-/// The ACTIVE goes on if its last cycle began at most this number of periods ago: less than any time-out (protocol 9.9).
+/// The ACTIVE goes on if its last cycle began at most this number of periods ago: less than any time-out (9.9).
 const GOES_ON: u128 = 3;
 
 /// What the beginning of a cycle does to the role.
@@ -145,8 +145,8 @@ impl State {
         self.control.set(role);
     }
 
-    /// Takes the request. One that would cut off a write into the memory of a SubDevice is refused, if it is not forced:
-    /// the own write as ACTIVE, that of an ACTIVE which goes on as INACTIVE.
+    /// Takes the request. One that would cut off a write into the memory of a SubDevice is refused, if it is not
+    /// forced: the own write as ACTIVE, that of an ACTIVE which goes on as INACTIVE.
     #[cold]
     fn permitted_request(&mut self, now: Instant, events: &mut Producer) -> Option<RoleRequest> {
         let (request, is_forced) = self.control.take_request()?;
