@@ -63,8 +63,10 @@ impl OfTwo {
         let any = take_own(links, engine, now);
         if let Some(other) = engine.take_collision()
             && is_lower(other, links.addresses().main)
+            && engine.memory_write_under_way().is_none()
         {
-            // There is no application that could decide. A scan under way ends with an error.
+            // There is no application that could decide. A scan under way ends with an error. After a write the next
+            // frame is another collision.
             engine.set_role(MainDeviceRole::Inactive);
         }
         any

@@ -136,7 +136,7 @@ impl<S: Services> SubDevice<S> {
     {
         let SubDevice { services, address, within, .. } = self;
         services.call(EngineKey, move |engine| {
-            let (known, identity) = (engine.dictionaries(), engine.info(address).map(|info| info.identity));
+            let (known, identity) = (engine.dictionaries(), engine.identity(address));
             start_with_mailbox(engine, address, within, move |mailbox| work(known.of(&mailbox, identity)))
         })
     }

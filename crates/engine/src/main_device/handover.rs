@@ -28,6 +28,11 @@ impl MainDevice {
     /// MainDevice must not send any more if the knowledge is to be handed over. Outputs of an active application then
     /// last until the watchdogs of the SubDevices expire, or until the other process has them in PREOP.
     pub fn knowledge(&self) -> Option<Knowledge> {
+        Some(Knowledge { dictionaries: self.segment.dictionaries.known(), ..self.knowledge_without_dictionaries()? })
+    }
+
+    /// The same without descriptions of objects, which no configuration needs.
+    pub(super) fn knowledge_without_dictionaries(&self) -> Option<Knowledge> {
         let view = self.segment.view();
         let found = view.found()?;
         let stations = found.stations();
@@ -46,7 +51,7 @@ impl MainDevice {
             offered: view.last_offered(),
             activations: self.activations,
             siis: self.cache.known(),
-            dictionaries: self.segment.dictionaries.known(),
+            dictionaries: Vec::new(),
             clocks: view.known_clocks().map(|known| (*known).clone()),
         })
     }

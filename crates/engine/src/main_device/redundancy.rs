@@ -9,7 +9,10 @@ use super::MainDevice;
 use super::declaration::Declaration;
 use super::identity::Configuration;
 use super::standby::Marks;
+use crate::board::standby::KNOWLEDGE_ROOM;
+use crate::event::{Event, StandbyEvent};
 use crate::exchange::{Exchange, StandbySetup};
+use crate::knowledge::Knowledge;
 use crate::layout::{Layout, LayoutError, LrwPolicy, PlannedMasterFrames};
 use crate::link::LinkSet;
 use crate::role::{MainDeviceRole, RoleControl};
@@ -86,13 +89,18 @@ impl MainDevice {
         if standby.published == Some(marks) && now < latest {
             return;
         }
-        let bytes = self.knowledge().map(|knowledge| knowledge.to_bytes()).unwrap_or_default();
+        // The INACTIVE needs neither descriptions of objects nor sequence numbers, which change with each frame.
+        let knowledge = self.knowledge_without_dictionaries();
+        let bytes = knowledge.map(|knowledge| Knowledge { sequence: 0, ..knowledge }.to_bytes()).unwrap_or_default();
         let Some(standby) = &mut self.standby else { return };
         standby.published = Some(marks);
         standby.publish_at = (now + PUBLISHED_EACH, now + PUBLISHED_AGAIN);
         let is_same = standby.words.knowledge.copy().is_some_and(|(_, before)| before == bytes);
-        if !is_same {
-            standby.words.knowledge.write(&bytes);
+        let is_written = is_same || standby.words.knowledge.write(&bytes);
+        let was_written = core::mem::replace(&mut standby.fits, is_written);
+        if was_written && !is_written {
+            let event = StandbyEvent::KnowledgeTooLong { bytes: bytes.len(), room: KNOWLEDGE_ROOM };
+            self.supervisor.append_event(now, Event::Standby(event), 0);
         }
     }
 

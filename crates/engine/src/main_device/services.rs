@@ -9,6 +9,7 @@ use core::time::Duration;
 use ringcat_wire::address::{RegisterAddress, StationAddress};
 use ringcat_wire::memory_write::WriteKind;
 use ringcat_wire::register::LoopControl;
+use ringcat_wire::sii::Identity;
 
 use super::MainDevice;
 use super::pending::Pending;
@@ -53,6 +54,16 @@ impl MainDevice {
             }
         };
         info.map(|info| (**info).clone())
+    }
+
+    /// Identity of a SubDevice as it was read last: also of one that has replaced another one since the scan.
+    pub fn identity(&self, subdevice: impl Into<Address>) -> Option<Identity> {
+        let view = self.segment.view();
+        let info = match view.find(subdevice)? {
+            Addressed::Undeclared(key) => view.unassigned(key)?.knowledge.info(),
+            Addressed::Member(index) => view.member(index)?.info,
+        };
+        info.map(|info| info.identity)
     }
 
     /// Starts a procedure on one SubDevice.

@@ -36,6 +36,8 @@ pub(super) struct Standby {
     pub boot_at: Instant,
     /// When the knowledge is made next, at the earliest and if nothing has changed.
     pub publish_at: (Instant, Instant),
+    /// The knowledge fits into its room.
+    pub fits: bool,
     /// What the published knowledge was made from.
     pub published: Option<Marks>,
     /// Ethernet between both MainDevices.
@@ -81,6 +83,7 @@ impl Standby {
             in_boot: None,
             boot_at: Instant(0),
             publish_at: (Instant(0), Instant(0)),
+            fits: true,
             published: None,
             ethernet,
             endpoint,

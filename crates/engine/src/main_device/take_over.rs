@@ -14,7 +14,7 @@ use super::MainDevice;
 use super::standby::Collision;
 use crate::board::live::{Life, Presence};
 use crate::board::standby::Takeover;
-use crate::declared::SubDeviceId;
+use crate::declared::{Address, SubDeviceId};
 use crate::event::{Event, StandbyEvent};
 use crate::knowledge::{Handover, KnownMailbox};
 use crate::link::Link;
@@ -23,9 +23,10 @@ use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::shared_segment::Beside;
 use crate::role::{MainDeviceRole, Partner, RoleCause, RoleRequest};
 use crate::segment::clocks::ClockObservation;
+use crate::segment::member::{MemberView, Phase};
 use crate::segment::setup::Setup;
 use crate::segment::unassigned::UnassignedView;
-use crate::segment::{Observation, Segment, StandbyObservation};
+use crate::segment::{Observation, StandbyObservation};
 use crate::time::Instant;
 
 /// After this time without frames of another ACTIVE, the next one is a new collision.
@@ -61,12 +62,39 @@ impl MainDevice {
     /// Posts a write into the memory of a SubDevice that is under way: the role is not given up meanwhile.
     fn post_memory_write(&mut self, now: Instant) {
         let write = self.supervisor.memory_write();
+        let is_due = self.standby.as_ref().is_some_and(|standby| now >= standby.boot_at);
+        let in_boot = if is_due { self.in_boot() } else { None };
         let Some(standby) = &mut self.standby else { return };
-        if now >= standby.boot_at {
+        if is_due {
             standby.boot_at = now + BOOT_EACH;
-            standby.in_boot = in_boot(&self.segment.view());
+            standby.in_boot = in_boot;
         }
         standby.words.post_write(write.or(standby.in_boot));
+    }
+
+    /// A write into the memory of a SubDevice that a change of the role would cut off now.
+    pub fn memory_write_under_way(&self) -> Option<MemoryWrite> {
+        self.supervisor.memory_write().or_else(|| self.in_boot())
+    }
+
+    /// A SubDevice that is in BOOT, or is to be.
+    fn in_boot(&self) -> Option<MemoryWrite> {
+        let (view, live) = (self.segment.view(), &self.segment.board.live);
+        let is_in_boot =
+            |index: usize| live.life(index).is_some_and(|life| life.al_status & 0x0F == AlState::Boot as u8);
+        let boots = |(index, member): &(usize, MemberView<'_>)| {
+            (member.target == AlState::Boot && member.phase != Phase::Absent) || is_in_boot(*index)
+        };
+        if let Some((index, _)) = view.members().enumerate().find(boots) {
+            return Some(Address::from(SubDeviceId(index)).memory_write(WriteKind::Boot));
+        }
+        let boots = |it: &UnassignedView<'_>| it.upkeep.as_ref().is_some_and(|upkeep| upkeep.target == AlState::Boot);
+        let undeclared = view.subdevices().unassigned().find(boots)?;
+        let position = undeclared.knowledge.info().map(|info| info.position);
+        Some(match position {
+            Some(position) => Address::from(position).memory_write(WriteKind::Boot),
+            None => MemoryWrite::new(WriteKind::Boot, true, usize::MAX),
+        })
     }
 
     /// A requested role takes effect: there is no application whose cycles could take it.
@@ -83,7 +111,7 @@ impl MainDevice {
         if role == self.role() {
             return;
         }
-        let write = self.supervisor.memory_write().filter(|_| role == MainDeviceRole::Inactive && !is_forced);
+        let write = self.memory_write_under_way().filter(|_| role == MainDeviceRole::Inactive && !is_forced);
         if let Some(write) = write {
             let event = Event::Standby(StandbyEvent::RoleRefused(write));
             self.supervisor.append_event(now, event, 0);
@@ -209,15 +237,4 @@ fn in_use(station: ringcat_wire::address::StationAddress, setup: &Setup) -> Opti
     let layout = setup.plan.mailbox_layout()?;
     let [_, send] = &setup.plan.mailbox[..] else { return None };
     Some(InUse { station, layout, send_manager: send.index, is_full: true })
-}
-
-/// A SubDevice that is in BOOT, or is to be.
-fn in_boot(view: &Segment) -> Option<MemoryWrite> {
-    let boot = |is_position, number| Some(MemoryWrite::new(WriteKind::Boot, is_position, number));
-    if let Some(index) = view.members().position(|member| member.target == AlState::Boot) {
-        return boot(false, index);
-    }
-    let in_boot = |it: &UnassignedView<'_>| it.upkeep.as_ref().is_some_and(|upkeep| upkeep.target == AlState::Boot);
-    let undeclared = view.subdevices().unassigned().find(in_boot)?;
-    boot(true, undeclared.knowledge.info().map_or(usize::MAX, |info| usize::from(info.position.0)))
 }

@@ -99,6 +99,13 @@ impl Slot {
         Slot { isolations, next_number: self.next_number, ..Slot::default() }
     }
 
+    /// The same for an application that begins: a port that is closed for a moment is opened by its own procedure, which
+    /// goes on.
+    pub fn emptied_for_application(&self) -> Slot {
+        let running = self.running.filter(|(running, _)| running.disturbance == Disturbance::OpenByPort);
+        Slot { running, ..self.emptied() }
+    }
+
     /// Requests a disturbance. It is under way at once if no other is.
     pub fn want(&mut self, wanted: Wanted) {
         self.next_number = wanted.number.wrapping_add(1);

@@ -36,6 +36,9 @@ pub(super) fn describe(event: &Event) -> Option<String> {
         StandbyEvent::HandOverRefused(partner) => {
             format!("the role was not handed over: the other MainDevice is {partner}")
         }
+        StandbyEvent::KnowledgeTooLong { bytes, room } => format!(
+            "the other MainDevice cannot follow: the knowledge of the segment has {bytes} bytes, there is room for {room}"
+        ),
         StandbyEvent::RoleRefused(write) => {
             format!("the role does not change: {write}; a forced request would cut that off")
         }

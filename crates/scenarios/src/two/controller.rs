@@ -59,6 +59,10 @@ pub struct Controller {
     pub is_dead: bool,
     /// Its application writes new outputs: the first byte of each area counts.
     pub writes: bool,
+    /// It activates an application after its scan.
+    pub activates: bool,
+    /// It has scanned, and activates none.
+    pub has_scanned: bool,
     /// Cycles that it has run as ACTIVE.
     pub cycles: u64,
     /// When it became ACTIVE last.
@@ -106,6 +110,8 @@ impl Controller {
             next_cycle: Instant::NEVER,
             is_dead: false,
             writes: true,
+            activates: true,
+            has_scanned: false,
             cycles: 0,
             changed_at: None,
             first_frame_at: None,
@@ -271,11 +277,12 @@ impl Controller {
 
     /// The steps to an application: as ACTIVE a scan, as INACTIVE the knowledge of the other one.
     fn advance_start(&mut self) {
-        if self.running.is_some() {
+        if self.running.is_some() || self.has_scanned {
             return;
         }
         match self.engine.role() {
             MainDeviceRole::Active => match self.engine.scan_result() {
+                Some(Ok(_)) if !self.activates => self.has_scanned = true,
                 Some(Ok(scan)) => {
                     let active = self.engine.activate((self.settings.declare)(&scan)).expect("the declaration fits");
                     self.run(active);

@@ -5,7 +5,7 @@ use std::time::Duration;
 use ringcat::standby::StandbyEvent;
 use ringcat::standby::{Partner, RoleRequest};
 use ringcat::{ActivateError, Denial};
-use ringcat::{Function, MainDeviceRole, SubDeviceId};
+use ringcat::{Function, Limits, MainDeviceRole, SubDeviceId};
 use ringcat_sim::cable::{CableId, Host};
 use ringcat_sim::fault::Fault;
 use ringcat_wire::al::AlState;
@@ -95,6 +95,32 @@ fn counters_of_the_active_are_readable_at_the_inactive() {
     assert_eq!(after.domains.len(), 1);
     assert_eq!((after.domains[0].state, after.domains[0].wkc), (2, after.domains[0].expected));
     assert!(two.controllers[0].engine.heard_diagnosis().is_none(), "it is ACTIVE, and has heard none");
+}
+
+// covers: MR-13, standby
+#[test]
+fn descriptions_of_objects_are_no_part_of_the_knowledge_of_the_other_one() {
+    let mut two = followed();
+    let engine = &mut two.controllers[0].engine;
+    let mailbox = engine.mailbox(SubDeviceId(3)).expect("it is declared");
+    let dictionary = engine.dictionaries().of(&mailbox, engine.identity(SubDeviceId(3)));
+    let limits = Limits::new(Duration::from_millis(100), Duration::from_secs(1));
+    let mut read = engine.start(async move {
+        dictionary.list(limits).await?;
+        dictionary.object(0x1018, limits).await
+    });
+    let read = (0..2_000).find_map(|_| {
+        two.run(CYCLE);
+        read.take()
+    });
+    assert!(matches!(read, Some(Ok(_))), "{read:?}");
+    // Each 5 s all is published again.
+    two.run(Duration::from_secs(6));
+    let known = two.controllers[0].engine.knowledge().expect("it has scanned");
+    let heard = two.controllers[1].engine.heard_knowledge().expect("it has arrived");
+    assert!(!known.dictionaries.is_empty() && heard.dictionaries.is_empty());
+    assert_eq!(heard.subdevices.len(), known.subdevices.len());
+    assert!(two.controllers[0].partner().is_ready(), "{:?}", two.controllers[0].partner());
 }
 
 // covers: REQ010, MR-15, standby

@@ -4,11 +4,12 @@
 use std::time::Duration;
 
 use ringcat::standby::{MemoryWrite, RoleRequest, StandbyEvent, WriteKind};
-use ringcat::{FoeOptions, SubDeviceId};
+use ringcat::{FoeOptions, Position, SubDeviceId};
 use ringcat_engine::mail::foe;
 use ringcat_engine::mail::stream::Bytes;
 use ringcat_engine::main_device::Pending;
-use ringcat_sim::cable::Host;
+use ringcat_sim::cable::{DeviceIndex, Host};
+use ringcat_sim::fault::Fault;
 use ringcat_wire::al::AlState;
 use scenarios::two::{CYCLE, Two};
 
@@ -148,4 +149,39 @@ fn in_a_collision_each_one_knows_which_of_both_writes() {
     two.controllers[1].request(RoleRequest::Inactive);
     two.run(50 * CYCLE);
     assert!(two.active() == Some(0) && written.is_running(), "{}", two.log());
+}
+
+// covers: standby, 9.6
+#[test]
+fn without_an_application_a_file_and_a_subdevice_in_boot_keep_the_role_too() {
+    let mut two = Two::new(ring_of(&KINDS, Host::First), declare, standby());
+    two.controllers[0].activates = false;
+    two.controllers[0].begin_active();
+    two.until(Duration::from_secs(5), "it has scanned", |two| two.controllers[0].has_scanned);
+    let drive = Position(DRIVE.0 as u16);
+    two.controllers[0].engine.start_state_request(drive, AlState::Boot);
+    two.run(Duration::from_millis(300));
+    two.mark();
+    two.controllers[0].request(RoleRequest::Inactive);
+    two.run(2 * CYCLE);
+    assert_eq!(refused(&two, 0), [MemoryWrite::new(WriteKind::Boot, true, DRIVE.0)], "{}", two.log());
+    assert_eq!(two.active(), Some(0));
+    two.controllers[0].engine.start_state_request(drive, AlState::Init);
+    two.run(Duration::from_millis(300));
+    two.controllers[0].request(RoleRequest::Inactive);
+    two.run(2 * CYCLE);
+    assert_eq!(two.active(), None, "{}", two.log());
+}
+
+// covers: standby, 9.6
+#[test]
+fn a_subdevice_in_boot_that_is_gone_does_not_keep_the_role() {
+    let mut two = in_op();
+    two.controllers[0].engine.start_state_request(DRIVE, AlState::Boot);
+    two.run(Duration::from_millis(300));
+    two.fault(Fault::PowerOff(DeviceIndex(DRIVE.0)));
+    two.run(Duration::from_millis(300));
+    two.controllers[0].request(RoleRequest::HandOver);
+    two.run(10 * CYCLE);
+    assert_eq!((two.active(), refused(&two, 0)), (Some(1), vec![]), "{}", two.log());
 }

@@ -117,6 +117,7 @@ impl Exchange {
         let last = core::mem::replace(&mut state.foreign_in, now);
         state.collided_with = Some(source);
         if last == 0 || now - last > APART {
+            state.collided_write = None;
             self.events.push(CyclicStandbyEvent::Collision { arrived_on, source }.pack());
         }
     }

@@ -30,6 +30,8 @@ pub(crate) const MOST_BYTES: usize = 1 << 20;
 const SOFTWARE_VERSION: u16 = 0x100A;
 /// Longest software version.
 const MOST_VERSION: usize = 256;
+/// First index behind the communication area.
+const PROFILE: u16 = 0x2000;
 /// Objects with the configured and the detected modules.
 const MODULES: [u16; 2] = [0xF030, 0xF050];
 /// All optional parts of the description of an entry.
@@ -156,7 +158,8 @@ impl ObjectDictionary {
                 Ok(entry) => {
                     kept.add(&known, bytes_of_entry(entry), |known| known.keep_entry(entry.clone()));
                 }
-                Err(InformationError::Refused(AbortCode::SUB_INDEX_DOES_NOT_EXIST)) => {
+                // Those of PDOs exist or not by what is mapped.
+                Err(InformationError::Refused(AbortCode::SUB_INDEX_DOES_NOT_EXIST)) if address.0 >= PROFILE => {
                     kept.add(&known, MISSING_BYTES, |known| known.keep_missing(address));
                 }
                 Err(_) => {}

@@ -12,7 +12,7 @@ use ringcat_wire::register::LoopControl;
 use crate::procedures::loops::{closed_at, followed, restore, until_ring_is_closed, write};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::segment::disturbance::Disturbance;
-use crate::segment::{IdleObservation, Observation};
+use crate::segment::{IdleObservation, Observation, Segment};
 use crate::supervisor::Bus;
 
 /// Maximum wait for other procedures that need the ports, and for one of idle operation that works on the segment.
@@ -62,6 +62,11 @@ async fn close_port<T>(
 ) -> Option<T> {
     let control = followed(bus, segment, station).await.ok()??;
     if control.loops[usize::from(port & 3)] == LoopControl::Closed {
+        return None;
+    }
+    // An application or a scan may have begun meanwhile.
+    let has_begun = |model: &Segment| model.is_active() || model.is_scanning();
+    if has_begun(&segment.view()) {
         return None;
     }
     segment.observe(Observation::PortsAltered(&[(station, control)]));

@@ -61,20 +61,23 @@ impl Segment {
         }
     }
 
-    /// A scan began with what was known then: a dictionary that was written since then is outdated in what it found,
-    /// too.
-    pub(in crate::segment) fn mark_outdated_pdos(&self, found: &mut Rc<Found>) {
-        let is_outdated = |info: &SubDeviceInfo| {
-            info.pdo_source.is_of_dictionary()
-                && self
-                    .subdevices
-                    .at(info.station)
-                    .and_then(|it| it.knowledge.info())
-                    .is_some_and(|known| known.pdo_source == PdoSource::Outdated && known.identity == info.identity)
+    /// A scan began with what was known then: what was written or read of a dictionary since then counts in what it
+    /// found, too.
+    pub(in crate::segment) fn take_newer_pdos(&self, found: &mut Rc<Found>) {
+        let newer_of = |info: &SubDeviceInfo| {
+            let known = self.subdevices.at(info.station)?.knowledge.info()?;
+            let is_newer = known.pdo_source != PdoSource::Sii
+                && (known.pdo_source, &known.pdos) != (info.pdo_source, &info.pdos)
+                && known.identity == info.identity;
+            is_newer.then(|| known.clone())
         };
-        if found.subdevices.iter().any(|info| is_outdated(info)) {
-            for info in Rc::make_mut(found).subdevices.iter_mut().filter(|info| is_outdated(info)) {
-                Rc::make_mut(info).pdo_source = PdoSource::Outdated;
+        if found.subdevices.iter().all(|info| newer_of(info).is_none()) {
+            return;
+        }
+        for info in &mut Rc::make_mut(found).subdevices {
+            if let Some(known) = newer_of(info) {
+                let info = Rc::make_mut(info);
+                (info.pdos, info.pdo_source) = (known.pdos.clone(), known.pdo_source);
             }
         }
     }

@@ -56,7 +56,7 @@ impl Segment {
     /// The segment was scanned again without an application. A result from before a scan or an application is refused.
     pub(in crate::segment) fn find_again(&mut self, versions: Versions, mut found: Rc<Found>) {
         let is_valid = self.are_addresses_as_in(versions);
-        self.mark_outdated_pdos(&mut found);
+        self.take_newer_pdos(&mut found);
         if let Stage::Scanned(scanned) = &mut self.stage
             && is_valid
         {
@@ -155,7 +155,11 @@ impl Segment {
         if keeping.is_on {
             declared.subdevices = declared.subdevices.keeping(before);
         }
-        let (slot, choices, frames_tested_until) = (self.slot.emptied(), self.choices, self.frames_tested_until);
+        let slot = match &stage {
+            Stage::Active(_) => self.slot.emptied_for_application(),
+            Stage::Unscanned | Stage::Scanning { .. } | Stage::Scanned(_) => self.slot.emptied(),
+        };
+        let (choices, frames_tested_until) = (self.choices, self.frames_tested_until);
         // The procedures that would restore them have ended.
         let altered = self.altered();
         let (idle, observed, link_control) = (self.idle.renewed(), self.observed, self.link_control);
