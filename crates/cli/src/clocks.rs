@@ -79,7 +79,7 @@ pub struct ClocksArguments {
     esi: EsiArgument,
 }
 
-/// Runs. It has held where all clocks locked and stayed together.
+/// Runs the command. It succeeds if all clocks locked and stayed in the window.
 pub fn run(arguments: &ClocksArguments) -> Result<Report, Failure> {
     let thread = arguments.access.thread;
     arguments.access.interfaces.links.check()?;

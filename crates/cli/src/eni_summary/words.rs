@@ -75,7 +75,7 @@ pub(super) fn ranges(numbers: &[usize]) -> String {
     texts.join(", ")
 }
 
-/// What a file calls something, without what would disturb a terminal.
+/// A name from a file, without control characters.
 pub(super) fn one_line(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }

@@ -13,7 +13,7 @@ type Found<'a> = HashMap<u16, &'a [PdoEntryInfo]>;
 
 /// The modules that a device on the bus has. `idents` are those of object 0xF050 by slot, empty where it was not read;
 /// `pdos` are the PDOs that the device describes. Where the modules of the idents do not have these PDOs and others
-/// have, the PDOs count. What no module of the description explains is left out.
+/// have, the PDOs decide. What no module of the description explains is left out.
 pub fn detected_modules<'a>(
     esi: &'a Esi,
     device: &'a Device,

@@ -28,7 +28,7 @@ pub struct Heard {
     pub is_known: bool,
 }
 
-/// What the ACTIVE has said of the segment and of its frames.
+/// What the ACTIVE has reported of the segment and of its frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct HeardDiagnosis {

@@ -31,7 +31,7 @@ pub(super) struct Standby {
     pub other_version: Option<u8>,
     /// The last collision while there was no application.
     pub collision: Option<Collision>,
-    /// A SubDevice in BOOT, and when it is looked for next.
+    /// A SubDevice in BOOT, and when it is searched next.
     pub in_boot: Option<MemoryWrite>,
     pub boot_at: Instant,
     /// When the knowledge is made next, at the earliest and if nothing has changed.

@@ -31,7 +31,7 @@ use crate::time::Instant;
 
 /// After this time without frames of another ACTIVE, the next one is a new collision.
 const COLLISIONS_APART: Duration = Duration::from_millis(100);
-/// Interval at which it is looked for SubDevices in BOOT.
+/// Interval at which SubDevices in BOOT are searched.
 const BOOT_EACH: Duration = Duration::from_millis(10);
 
 impl MainDevice {

@@ -1,4 +1,4 @@
-//! What the ACTIVE sees, for the INACTIVE (protocol MR-14, MR-19, REQ045).
+//! What the ACTIVE has measured, for the INACTIVE (protocol MR-14, MR-19, REQ045).
 
 use ringcat_engine::main_device::HeardDiagnosis;
 
@@ -10,7 +10,7 @@ use crate::main_device::MainDevice;
 use crate::supervisor_thread::SupervisorThread;
 
 impl<L: Links> MainDevice<L> {
-    /// What the ACTIVE sees of the segment, with the counters of its frames and cycles, as of the last cycle that has
+    /// What the ACTIVE has measured of the segment, with the counters of its frames and cycles, as of the last cycle that has
     /// arrived as a whole; `None` before one, and if this MainDevice is alone.
     pub fn heard_diagnosis(&self) -> Option<HeardDiagnosis> {
         self.engine.heard_diagnosis()

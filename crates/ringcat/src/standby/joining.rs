@@ -120,7 +120,7 @@ impl<L: Links> MainDevice<L> {
     }
 
     /// Follows the ACTIVE with an application: nothing is sent before it takes over. `declare` gets what the ACTIVE
-    /// knows of the segment, and returns the declaration, the same as on the ACTIVE.
+    /// has as knowledge of the segment, and returns the declaration, the same as on the ACTIVE.
     ///
     /// # Errors
     /// This MainDevice is ACTIVE, not all is known yet ([`Heard::is_known`]), or the declaration does not fit. The

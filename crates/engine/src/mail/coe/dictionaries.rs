@@ -142,7 +142,7 @@ impl ObjectDictionary {
         Ok(object)
     }
 
-    /// Description of an entry with all that the SubDevice tells of it, of its type if it is known.
+    /// Description of an entry with all optional parts that the SubDevice returns, of its type if it is known.
     ///
     /// # Errors
     /// As [`ObjectDictionary::list`].
