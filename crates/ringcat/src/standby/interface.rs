@@ -32,7 +32,7 @@ const BURST: usize = 64;
 pub enum PartnerInterfaceError {
     /// The host does not make it.
     Tap(TapError),
-    /// [`StandbyOptions::max_acyclic`](super::StandbyOptions::max_acyclic) is 0, or the endpoint is in use.
+    /// [`StandbyOptions::max_acyclic`](super::StandbyOptions::max_acyclic) is 0, or the endpoint is in use, or was used before.
     NoEthernet,
     /// The thread has ended.
     Gone(Error),
@@ -43,7 +43,7 @@ impl fmt::Display for PartnerInterfaceError {
         match self {
             PartnerInterfaceError::Tap(error) => error.fmt(f),
             PartnerInterfaceError::NoEthernet => {
-                f.write_str("no Ethernet to the other MainDevice: it is off (max_acyclic), or in use")
+                f.write_str("no Ethernet to the other MainDevice: it is off (max_acyclic), in use, or was used before")
             }
             PartnerInterfaceError::Gone(error) => error.fmt(f),
         }
