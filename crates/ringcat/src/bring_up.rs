@@ -15,7 +15,7 @@ use crate::supervisor_thread::{Activated, Ended, SupervisorThread};
 impl<L: Links> MainDevice<L> {
     /// Scans, and activates what `declare` returns: the shortest way to OP, because only what operation needs is read
     /// of the SIIs before. Names and operation modes of clocks are empty in what `declare` gets, unless
-    /// [`Options::sii_extent`](crate::Options::sii_extent\) requests them. They are read in the background as soon as
+    /// [`Options::sii_extent`](crate::Options::sii_extent) requests them. They are read in the background as soon as
     /// all SubDevices are in their target states, and are in [`MainDevice::subdevices`] and in searches by name then;
     /// [`Services::complete_siis`](crate::Services::complete_siis) waits for them.
     ///

@@ -109,7 +109,7 @@ impl Drop for PartnerInterface {
 
 impl SupervisorThread {
     /// Makes a network interface with this name and MAC address that leads to the other MainDevice, in the network
-    /// namespace of the calling thread. Its MTU is [`ETHERNET_MTU`](super::ETHERNET_MTU). It has no carrier before the
+    /// namespace of the calling thread. Its MTU is [`ETHERNET_MTU`]. It has no carrier before the
     /// other MainDevice answers.
     ///
     /// # Errors
