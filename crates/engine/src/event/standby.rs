@@ -63,8 +63,8 @@ pub enum StandbyEvent {
     /// A requested change of the role was refused: this write into the memory of a SubDevice is under way, and the
     /// change would cut it off ([`RoleControl::force`](crate::role::RoleControl::force)).
     RoleRefused(MemoryWrite),
-    /// The knowledge of the segment is too long for its place in master frames: the other MainDevice cannot follow, and a
-    /// takeover goes through INIT. About 400 SubDevices fit.
+    /// The knowledge of the segment is too long for its place in master frames: the other MainDevice cannot follow, and
+    /// a takeover goes through INIT. About 400 SubDevices fit.
     KnowledgeTooLong {
         /// Its bytes.
         bytes: usize,

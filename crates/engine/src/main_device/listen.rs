@@ -62,8 +62,8 @@ impl MainDevice {
         known(&self.standby.as_ref()?.words.heard)
     }
 
-    /// What the ACTIVE has measured of the segment: its counters, carriers and domains (protocol MR-14, MR-19), as of the last
-    /// cycle that has arrived as a whole; `None` before one, and without the options of MainDevice redundancy.
+    /// What the ACTIVE has measured of the segment: its counters, carriers and domains (protocol MR-14, MR-19), as of
+    /// the last cycle that has arrived as a whole; `None` before one, and without the options of MainDevice redundancy.
     /// [`HeardDiagnosis::at`] says how old it is: without an ACTIVE it remains.
     pub fn heard_diagnosis(&self) -> Option<HeardDiagnosis> {
         let words = &self.standby.as_ref()?.words;

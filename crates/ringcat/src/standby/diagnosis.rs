@@ -10,8 +10,8 @@ use crate::main_device::MainDevice;
 use crate::supervisor_thread::SupervisorThread;
 
 impl<L: Links> MainDevice<L> {
-    /// What the ACTIVE has measured of the segment, with the counters of its frames and cycles, as of the last cycle that has
-    /// arrived as a whole; `None` before one, and if this MainDevice is alone.
+    /// What the ACTIVE has measured of the segment, with the counters of its frames and cycles, as of the last cycle
+    /// that has arrived as a whole; `None` before one, and if this MainDevice is alone.
     pub fn heard_diagnosis(&self) -> Option<HeardDiagnosis> {
         self.engine.heard_diagnosis()
     }

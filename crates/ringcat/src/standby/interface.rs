@@ -32,7 +32,8 @@ const BURST: usize = 64;
 pub enum PartnerInterfaceError {
     /// The host does not make it.
     Tap(TapError),
-    /// [`StandbyOptions::max_acyclic`](super::StandbyOptions::max_acyclic) is 0, or the endpoint is in use, or was used before.
+    /// [`StandbyOptions::max_acyclic`](super::StandbyOptions::max_acyclic) is 0, or the endpoint is in use, or was used
+    /// before.
     NoEthernet,
     /// The thread has ended.
     Gone(Error),

@@ -37,7 +37,7 @@ pub(super) fn describe(event: &Event) -> Option<String> {
             format!("the role was not handed over: the other MainDevice is {partner}")
         }
         StandbyEvent::KnowledgeTooLong { bytes, room } => format!(
-            "the other MainDevice cannot follow: the knowledge of the segment has {bytes} bytes, there is room for {room}"
+            "the other MainDevice cannot follow: the knowledge of the segment has {bytes} bytes, at most {room}"
         ),
         StandbyEvent::RoleRefused(write) => {
             format!("the role does not change: {write}; a forced request would cut that off")
