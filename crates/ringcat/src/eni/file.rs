@@ -138,7 +138,8 @@ impl EniFile {
             stated.revision = subdevice.revision;
             stated.ports = ports(&subdevice.physics);
             if let Some(mailbox) = &subdevice.mailbox {
-                stated.protocols = Some(protocols(&mailbox.protocols));
+                // A list may be absent: then nothing is stated.
+                stated.protocols = Some(protocols(&mailbox.protocols)).filter(|it| it.0 != 0);
                 stated.boot_mailbox = boot_mailbox(mailbox);
             }
             stated

@@ -322,6 +322,18 @@ fn differences_from_an_eni_are_checked_by_the_bus_too() {
     assert_eq!(of_eni(&types, moved), [(SyncManager, false)]);
 }
 
+// covers: network-file, eni-run
+#[test]
+fn an_eni_without_protocols_of_a_mailbox_states_nothing_of_them() {
+    let export = file_of(&BUS, |_| ()).file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let has_protocol = |line: &&str| line.contains("<Protocol>");
+    assert!(export.text.lines().any(|line| has_protocol(&line)));
+    let text: Vec<&str> = export.text.lines().filter(|line| !has_protocol(line)).collect();
+    let eni = EniFile::from_bytes(text.join("\n").as_bytes()).unwrap_or_else(|error| panic!("{error}"));
+    let (_, scan) = scanned(&BUS);
+    assert_eq!(kinds(&eni.configuration.differences(found(&scan), &eni.stated())), []);
+}
+
 /// The differences of a bus to the ENI of a changed network file, whose marks are checked on the bus.
 fn of_eni(types: &[&str], change: fn(&mut NetworkFile)) -> Vec<(DifferenceKind, bool)> {
     let file = file_of(types, change).file;
