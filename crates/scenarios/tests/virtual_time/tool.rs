@@ -6,7 +6,7 @@ use std::time::Duration;
 use ringcat::{
     Acknowledge, AlState, AlStatus, AlStatusCode, EepromAssignment, EepromOwner, Error, Event, Link, MainDevice,
     Neighbour, Options, PortOf, Position, RawDatagram, RegisterAddress, Services, SubDeviceId, SubDevicePorts, Subject,
-    Subjects, TimedEvent, Urgency,
+    Subjects, TimedEvent, Urgency, automatic,
 };
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::description::DeviceDescription;
@@ -240,6 +240,28 @@ fn delays_of_a_ring_without_an_application_are_measured_and_it_is_closed_again()
             assert!(main_device.links_mut().network().devices().all(|device| loops(device) == 0), "{after}");
         }
         assert!(std::iter::from_fn(|| main_device.pop_event()).next().is_none());
+    }
+}
+
+/// An application begins at every moment of a measurement: the ring is closed again, and its opening is no event.
+// covers: registers, ring-cut
+#[test]
+fn an_application_that_begins_while_delays_are_measured_reports_no_open_ring() {
+    for after in 0..40 {
+        let mut main_device = idle(ring(clocked_segment(6), options()));
+        let report = main_device.engine_mut().start_port_report();
+        main_device.attend(Duration::from_micros(150 * after));
+        let declaration = automatic(&main_device.subdevices(), Duration::from_millis(1));
+        let mut application = main_device.activate(declaration).map_err(Error::from).expect("it fits");
+        application.wait_until_op(LIMIT).expect("all are well");
+        (0..200).for_each(|_| application.cycle(|_| ()));
+        drop(report);
+        let events: Vec<Event> = std::iter::from_fn(|| application.pop_event()).map(|timed| timed.event).collect();
+        let of_ring = |event: &&Event| event.subject() == Subject::Ring;
+        let seen: Vec<&Event> = events.iter().filter(of_ring).collect();
+        assert!(seen.is_empty(), "{after}: {seen:?}");
+        let loops = |device: &ringcat_sim::device::Device| device.controller.register(map::DL_CONTROL, 2)[1];
+        assert!(application.links_mut().network().devices().all(|device| loops(device) == 0), "{after}");
     }
 }
 
