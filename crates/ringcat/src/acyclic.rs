@@ -1,5 +1,8 @@
 //! Where the acyclic half runs: in the thread of the cycles, or in one of its own.
 
+#[cfg(feature = "standby")]
+use std::time::Duration;
+
 use ringcat_engine::AcyclicCounters;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::SubDeviceInfo;
@@ -29,6 +32,17 @@ pub trait AcyclicHalf {
     /// As INACTIVE on shared links: takes an own frame of its class that has come back.
     #[cfg(feature = "standby")]
     fn take_returned(&mut self, frame: &[u8], now: Instant);
+
+    /// Reports SubDevices whose watchdog is shorter than a takeover may last. Does not wait.
+    #[cfg(feature = "standby")]
+    fn report_watchdogs_below(&mut self, needed: Duration, now: Instant);
+
+    /// These SubDevices, and their watchdogs. Not for the cyclic path.
+    ///
+    /// # Errors
+    /// Its thread has ended.
+    #[cfg(feature = "standby")]
+    fn watchdogs_below(&self, needed: Duration) -> Result<Vec<(SubDeviceId, Duration)>, Error>;
 
     /// Runs procedures, and sends on shared links as far as the window allows.
     fn work(&mut self, links: &mut impl Links, window: &Window);
@@ -106,6 +120,16 @@ impl AcyclicHalf for Inline {
     #[cfg(feature = "standby")]
     fn take_returned(&mut self, frame: &[u8], now: Instant) {
         self.engine.take_returned(frame, now);
+    }
+
+    #[cfg(feature = "standby")]
+    fn report_watchdogs_below(&mut self, needed: Duration, now: Instant) {
+        self.engine.report_watchdogs_below(needed, now);
+    }
+
+    #[cfg(feature = "standby")]
+    fn watchdogs_below(&self, needed: Duration) -> Result<Vec<(SubDeviceId, Duration)>, Error> {
+        Ok(self.engine.watchdogs_below(needed))
     }
 
     fn work(&mut self, links: &mut impl Links, window: &Window) {

@@ -12,6 +12,7 @@
 //! thread. Below that are an [`Engine`](crate::Engine) with [`EngineOptions::standby`] and the
 //! [`Exchange`](crate::Exchange) of its application, which `docs/standby.md` describes.
 
+mod alarm;
 mod diagnosis;
 mod ethernet;
 #[cfg(feature = "packet")]

@@ -436,6 +436,20 @@ impl AcyclicHalf for SupervisorThread {
         Instant::NEVER
     }
 
+    #[cfg(feature = "standby")]
+    fn report_watchdogs_below(&mut self, needed: Duration, now: Instant) {
+        // If the thread has ended there is nothing to report.
+        let _ = self.begin(move |engine, _| {
+            engine.report_watchdogs_below(needed, now);
+            Box::new(|_, _| true)
+        });
+    }
+
+    #[cfg(feature = "standby")]
+    fn watchdogs_below(&self, needed: Duration) -> Result<Vec<(SubDeviceId, Duration)>, Error> {
+        self.act(move |engine| engine.watchdogs_below(needed))
+    }
+
     fn states(&self) -> Vec<SubDeviceState> {
         SupervisorThread::states(self)
     }

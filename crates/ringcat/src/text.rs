@@ -34,7 +34,7 @@ pub fn describe(timed: &TimedEvent, names: &Names) -> String {
         .or_else(|| messages::of_command(event, names, *occupants))
         .or_else(|| of_process_data(event));
     #[cfg(feature = "standby")]
-    let line = line.or_else(|| standby::describe(event));
+    let line = line.or_else(|| standby::describe(event, names));
     // Every known event has a line; a newer engine may report others.
     line.unwrap_or_else(|| format!("{event:?}"))
 }

@@ -45,6 +45,8 @@ pub struct Takeover {
     pub warm_takeovers: u64,
     /// Frames of another ACTIVE that were reported
     pub collisions: u64,
+    /// Alarms: no ACTIVE was there, and this one did not take over
+    pub alarms: u64,
     /// Differences of the configuration that were reported
     pub configuration_differences: u64,
     /// The other MainDevice was ready to take over at the end

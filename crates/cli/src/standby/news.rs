@@ -86,6 +86,7 @@ impl News {
             StandbyEvent::HandOverRefused(partner) => {
                 self.refused = Some(format!("the other MainDevice refused the role: {partner}"));
             }
+            StandbyEvent::NoActive { .. } => seen.alarms += 1,
             StandbyEvent::RoleRefused(write) => self.refused = Some(format!("the role was kept: {write}")),
             _ => {}
         }

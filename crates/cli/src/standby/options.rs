@@ -112,6 +112,11 @@ pub struct PolicyArguments {
     /// Stay INACTIVE: neither take over, nor be handed the role over
     #[arg(long, requires = "declaration")]
     permanent_standby: bool,
+    /// Refuse SubDevices whose watchdog is shorter than a takeover may last
+    ///
+    /// That is --timeout and two cycles. Such a SubDevice leaves OP in a takeover; without this option it is named.
+    #[arg(long, requires = "declaration", conflicts_with = "permanent_standby")]
+    pub strict: bool,
 }
 
 impl PolicyArguments {

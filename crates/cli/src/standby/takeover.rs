@@ -107,6 +107,7 @@ impl Controller<'_> {
         let joiner = Joiner {
             supervisor: self.supervisor.clone(),
             policy: arguments.policy.policy(arguments.guard),
+            is_strict: arguments.policy.strict,
             declared: Arc::new(arguments.declared.clone()),
             network,
             thread: arguments.thread,

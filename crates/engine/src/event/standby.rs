@@ -8,6 +8,7 @@ use ringcat_wire::frame::MacAddress;
 use ringcat_wire::master_frame::{NotReady, Stage};
 use ringcat_wire::memory_write::MemoryWrite;
 
+use crate::declared::SubDeviceId;
 use crate::link::Link;
 use crate::queue::WORDS;
 use crate::role::{MainDeviceRole, Partner, RoleCause};
@@ -63,6 +64,25 @@ pub enum StandbyEvent {
     /// A requested change of the role was refused: this write into the memory of a SubDevice is under way, and the
     /// change would cut it off ([`RoleControl::force`](crate::role::RoleControl::force)).
     RoleRefused(MemoryWrite),
+    /// No ACTIVE is there for the time-out, and this MainDevice is not allowed to take over, or has no link: outputs of
+    /// the SubDevices stay as they are or are switched off by their watchdogs. Once per silence; the next event is
+    /// [`StandbyEvent::ActiveIsBack`] or [`StandbyEvent::RoleChanged`].
+    NoActive {
+        /// Time since the last frame of an ACTIVE, or since this MainDevice began to wait for one.
+        silence: Duration,
+    },
+    /// After [`StandbyEvent::NoActive`]: an ACTIVE is there.
+    ActiveIsBack,
+    /// The watchdog of a SubDevice with outputs, as declared, is shorter than a takeover may last: it leaves OP in one.
+    /// Once when the policy is set.
+    WatchdogTooShort {
+        /// The SubDevice.
+        subdevice: SubDeviceId,
+        /// Its watchdog for process data (registers 0x0400, 0x0420).
+        watchdog: Duration,
+        /// The time-out and two cycles (protocol 9.9).
+        needed: Duration,
+    },
     /// The knowledge of the segment is too long for its place in master frames: the other MainDevice cannot follow, and
     /// a takeover goes through INIT. About 400 SubDevices fit.
     KnowledgeTooLong {
@@ -82,6 +102,8 @@ const KIND_COUNT: u64 = 0x15;
 const KIND_VERSION: u64 = 0x16;
 const KIND_REFUSED: u64 = 0x17;
 const KIND_KEPT: u64 = 0x18;
+const KIND_NO_ACTIVE: u64 = 0x19;
+const KIND_BACK: u64 = 0x1A;
 
 /// An event of the exchange, which is packed into words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -128,6 +150,10 @@ pub enum CyclicStandbyEvent {
     HandOverRefused(Partner),
     /// See [`StandbyEvent::RoleRefused`].
     RoleRefused(MemoryWrite),
+    /// See [`StandbyEvent::NoActive`].
+    NoActive(Duration),
+    /// See [`StandbyEvent::ActiveIsBack`].
+    ActiveIsBack,
 }
 
 impl CyclicStandbyEvent {
@@ -168,6 +194,8 @@ impl CyclicStandbyEvent {
             }
             CyclicStandbyEvent::HandOverRefused(partner) => [KIND_REFUSED, partner_word(partner), 0],
             CyclicStandbyEvent::RoleRefused(write) => [KIND_KEPT | (write.code() as u64) << 16, 0, 0],
+            CyclicStandbyEvent::NoActive(silence) => [KIND_NO_ACTIVE, silence.as_nanos() as u64, 0],
+            CyclicStandbyEvent::ActiveIsBack => [KIND_BACK, 0, 0],
         }
     }
 
@@ -205,6 +233,8 @@ impl CyclicStandbyEvent {
                 Some(write) => Some(CyclicStandbyEvent::RoleRefused(write)),
                 None => None,
             },
+            KIND_NO_ACTIVE => Some(CyclicStandbyEvent::NoActive(Duration::from_nanos(words[1]))),
+            KIND_BACK => Some(CyclicStandbyEvent::ActiveIsBack),
             _ => None,
         }
     }
@@ -228,6 +258,8 @@ impl CyclicStandbyEvent {
             CyclicStandbyEvent::OtherVersion { got, least } => StandbyEvent::OtherVersion { got, least },
             CyclicStandbyEvent::HandOverRefused(partner) => StandbyEvent::HandOverRefused(partner),
             CyclicStandbyEvent::RoleRefused(write) => StandbyEvent::RoleRefused(write),
+            CyclicStandbyEvent::NoActive(silence) => StandbyEvent::NoActive { silence },
+            CyclicStandbyEvent::ActiveIsBack => StandbyEvent::ActiveIsBack,
         }
     }
 }
@@ -286,6 +318,8 @@ mod tests {
             CyclicStandbyEvent::OtherVersion { got: 3, least: 2 },
             CyclicStandbyEvent::HandOverRefused(Partner::Absent),
             CyclicStandbyEvent::RoleRefused(write),
+            CyclicStandbyEvent::NoActive(Duration::from_nanos(0x1234_5678_9ABC)),
+            CyclicStandbyEvent::ActiveIsBack,
         ];
         for event in events {
             assert_eq!(CyclicEvent::unpack(event.pack()), Some(CyclicEvent::Standby(event)));

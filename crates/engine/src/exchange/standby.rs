@@ -22,6 +22,7 @@ use super::Exchange;
 use super::following::{Following, OutputsSeen};
 use super::master_frames::MasterFrames;
 use crate::domain::DomainId;
+use crate::event::CyclicStandbyEvent;
 use crate::layout::Layout;
 use crate::link::{Link, LinkSet};
 use crate::role::{MainDeviceRole, Partner, RoleControl};
@@ -116,6 +117,11 @@ impl Exchange {
     /// State of the other MainDevice, as determined by the ACTIVE.
     pub fn partner(&self) -> Partner {
         self.standby.0.as_ref().map_or(Partner::Absent, |state| state.watch.partner())
+    }
+
+    /// Reports what a policy has found, in order with the events of the exchange. For the cyclic path.
+    pub fn report_standby(&mut self, event: CyclicStandbyEvent) {
+        self.events.push(event.pack());
     }
 
     /// Process data for the other MainDevice: what leaves in this role. The bytes of the other direction are left out

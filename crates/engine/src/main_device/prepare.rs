@@ -325,12 +325,17 @@ pub(super) fn report_oddities(segment: &SharedSegment, subdevices: &SubDevices, 
     }
 }
 
+/// Time of a SubDevice's watchdog for process data, as declared; `None` if it is off.
+pub(super) fn watchdog_of(member: &MemberView<'_>) -> Option<Duration> {
+    let divider = member.config.watchdog_divider.map_or(WatchdogDivider::default(), WatchdogDivider);
+    let intervals = member.config.watchdog_intervals.map_or(WatchdogTime::default(), WatchdogTime);
+    Some(Duration::from_nanos(intervals.duration_ns(divider)?))
+}
+
 /// Period of a SubDevice's outputs and time of its watchdog, if the watchdog is shorter.
 fn beyond_watchdog(subdevice: usize, member: &MemberView<'_>, layout: &Layout) -> Option<(Duration, Duration)> {
     let plan = &member.setup.as_ref()?.plan;
-    let divider = member.config.watchdog_divider.map_or(WatchdogDivider::default(), WatchdogDivider);
-    let intervals = member.config.watchdog_intervals.map_or(WatchdogTime::default(), WatchdogTime);
-    let watchdog = Duration::from_nanos(intervals.duration_ns(divider)?);
+    let watchdog = watchdog_of(member)?;
     let watched = plan.process_data.iter().filter(|area| area.register.control.watchdog);
     let periods = watched.filter_map(|area| {
         let (domain, _) = layout.area(subdevice, area.sync_manager)?;

@@ -8,8 +8,10 @@ use ringcat_wire::al::AlState;
 use super::MainDevice;
 use super::declaration::Declaration;
 use super::identity::Configuration;
+use super::prepare::watchdog_of;
 use super::standby::Marks;
 use crate::board::standby::KNOWLEDGE_ROOM;
+use crate::declared::SubDeviceId;
 use crate::event::{Event, StandbyEvent};
 use crate::exchange::{Exchange, StandbySetup};
 use crate::knowledge::Knowledge;
@@ -17,6 +19,7 @@ use crate::layout::{Layout, LayoutError, LrwPolicy, PlannedMasterFrames};
 use crate::link::LinkSet;
 use crate::role::{MainDeviceRole, RoleControl};
 use crate::segment::SubDevices;
+use crate::segment::member::MemberView;
 use crate::time::Instant;
 
 /// Shortest time between two publications of the knowledge.
@@ -78,6 +81,31 @@ impl MainDevice {
         Ok(())
     }
 
+    /// Reports what a policy has found before there is an application.
+    pub fn report_standby(&mut self, event: StandbyEvent, now: Instant) {
+        self.supervisor.append_event(now, Event::Standby(event), 0);
+    }
+
+    /// SubDevices with outputs whose watchdog is shorter than this time, as declared, and its time. A gap of process
+    /// data that lasts longer takes them out of OP. Empty before there is an application.
+    pub fn watchdogs_below(&self, time: Duration) -> Vec<(SubDeviceId, Duration)> {
+        let view = self.segment.view();
+        let short = |(index, member): (usize, MemberView<'_>)| {
+            let plan = &member.setup.as_ref()?.plan;
+            let is_watched = plan.process_data.iter().any(|area| area.register.control.watchdog);
+            let watchdog = watchdog_of(&member).filter(|watchdog| is_watched && *watchdog < time)?;
+            Some((SubDeviceId(index), watchdog))
+        };
+        view.members().enumerate().filter_map(short).collect()
+    }
+
+    /// Reports each of these SubDevices.
+    pub fn report_watchdogs_below(&mut self, needed: Duration, now: Instant) {
+        for (subdevice, watchdog) in self.watchdogs_below(needed) {
+            self.report_standby(StandbyEvent::WatchdogTooShort { subdevice, watchdog, needed }, now);
+        }
+    }
+
     /// Publishes the knowledge of the segment for the other MainDevice, if it is time.
     pub(super) fn publish_knowledge(&mut self, now: Instant) {
         let Some(standby) = &self.standby else { return };
@@ -106,9 +134,7 @@ impl MainDevice {
 
     fn marks(&self) -> Marks {
         let view = self.segment.view();
-        let is_settled = |member: &crate::segment::member::MemberView<'_>| {
-            matches!(member.phase, crate::segment::member::Phase::Settled(_))
-        };
+        let is_settled = |member: &MemberView<'_>| matches!(member.phase, crate::segment::member::Phase::Settled(_));
         Marks {
             cabling: view.versions().cabling,
             adoptions: view.adoptions(),

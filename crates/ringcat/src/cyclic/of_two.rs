@@ -114,6 +114,9 @@ impl Cyclic {
             writes: exchange.memory_write().is_some(),
             other_writes: exchange.memory_write_of_collided().is_some(),
         };
+        if let Some(notice) = watch.look_out(&situation, now) {
+            exchange.report_standby(notice.into());
+        }
         if let Some(request) = watch.decide(&situation, now)
             && let Some(control) = exchange.role_control()
         {
@@ -140,7 +143,7 @@ impl Cyclic {
     }
 
     /// The period of the cycles.
-    fn period(&self) -> Duration {
+    pub fn period(&self) -> Duration {
         Duration::from_nanos(self.period_ns)
     }
 }

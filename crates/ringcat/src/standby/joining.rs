@@ -10,6 +10,7 @@ use ringcat_engine::role::{RoleControl, RoleRequest};
 use ringcat_engine::time::Instant;
 use ringcat_engine::{Scan, ScanError};
 
+use super::alarm::{Lookout, Notice};
 use super::policy::Dice;
 use super::{ForwardingCounters, NeedsTwoLinks, Policy};
 use crate::acyclic::Inline;
@@ -41,6 +42,7 @@ pub struct Joining {
     silent_since: Instant,
     /// Silence after which this one becomes ACTIVE.
     limit: Duration,
+    lookout: Lookout,
 }
 
 impl Joining {
@@ -52,14 +54,25 @@ impl Joining {
     pub(crate) fn on(links: &impl Links, policy: &Policy) -> Joining {
         let (main, now) = (links.addresses().main, links.now());
         let pause = Dice::new(main, now).up_to(policy.listen);
-        Joining { takes_over: policy.takes_over, silent_since: now, limit: policy.listen + pause }
+        let (limit, lookout) = (policy.listen + pause, Lookout::new(now));
+        Joining { takes_over: policy.takes_over, silent_since: now, limit, lookout }
     }
 
     /// What follows from the frames that were received. Without a link that is up none can be received: then it listens
-    /// on.
-    pub fn next<L: Links>(&mut self, main_device: &MainDevice<L>) -> Next {
+    /// on. If no ACTIVE is there and it does not become ACTIVE, [`StandbyEvent::NoActive`](super::StandbyEvent) is
+    /// reported.
+    pub fn next<L: Links>(&mut self, main_device: &mut MainDevice<L>) -> Next {
         let has_link = Link::ALL.iter().any(|link| main_device.links.carrier(*link) != Some(false));
-        self.decide(&main_device.heard(), has_link, main_device.now())
+        let (heard, now) = (main_device.heard(), main_device.now());
+        if let Some(notice) = self.look_out(&heard, now) {
+            main_device.engine.report_standby(notice.into(), now);
+        }
+        self.decide(&heard, has_link, now)
+    }
+
+    /// Whether an alarm is to be reported. One that becomes ACTIVE has time to do so.
+    pub(crate) fn look_out(&mut self, heard: &Heard, now: Instant) -> Option<Notice> {
+        self.lookout.note(heard.at, if self.takes_over { self.limit * 2 } else { self.limit }, now)
     }
 
     pub(crate) fn decide(&mut self, heard: &Heard, has_link: bool, now: Instant) -> Next {
@@ -186,7 +199,7 @@ impl<L: Links> MainDevice<L> {
             if let Err(error) = self.forwarded().check_identity() {
                 return Err(Box::new(Refused { error: error.into(), main_device: self }));
             }
-            match joining.next(&self) {
+            match joining.next(&mut self) {
                 // What the ACTIVE has sent is known, and too old to be followed.
                 Next::Listen if self.heard().is_known => self.attend(SLICE),
                 Next::Listen => {}

@@ -11,6 +11,8 @@ use ringcat_engine::role::RoleRequest;
 use ringcat_engine::time::Instant;
 use ringcat_wire::frame::MacAddress;
 
+use super::alarm::{Lookout, Notice};
+
 /// Fewer cycles without process data may be those of a single fault of a cable.
 const LEAST_CYCLES: u32 = 3;
 
@@ -101,6 +103,12 @@ impl Policy {
         self
     }
 
+    /// How long process data may be missing in a takeover: the time-out and two cycles (protocol 9.9). A watchdog of a
+    /// SubDevice with outputs has to be longer.
+    pub fn longest_gap_of(&self, period: Duration) -> Duration {
+        self.time_out_of(period) + 2 * period
+    }
+
     /// The time-out with cycles of this period.
     pub fn time_out_of(&self, period: Duration) -> Duration {
         (period * self.time_out_cycles.max(LEAST_CYCLES)).max(self.least_time_out)
@@ -140,13 +148,25 @@ pub(crate) struct Watch {
     dice: Dice,
     /// The random pause, and since when this MainDevice is INACTIVE for which it was chosen.
     pause: (Instant, Duration),
+    lookout: Lookout,
 }
 
 impl Watch {
     /// For cycles of this period, of a MainDevice with this main address.
     pub fn new(policy: Policy, period: Duration, main: MacAddress, now: Instant) -> Watch {
         let (time_out, dice) = (policy.time_out_of(period), Dice::new(main, now));
-        Watch { policy, time_out, own: main, dice, pause: (Instant::NEVER, Duration::ZERO) }
+        let (pause, lookout) = ((Instant::NEVER, Duration::ZERO), Lookout::new(now));
+        Watch { policy, time_out, own: main, dice, pause, lookout }
+    }
+
+    /// Whether an alarm is to be reported in the cycle that begins now. One that takes over has time to do so.
+    pub fn look_out(&mut self, situation: &Situation, now: Instant) -> Option<Notice> {
+        if situation.role == MainDeviceRole::Active {
+            self.lookout.is_active(now);
+            return None;
+        }
+        let limit = self.time_out * if self.policy.takes_over { 3 } else { 1 };
+        self.lookout.note(situation.heard_at.or(situation.heard_any_at), limit, now)
     }
 
     /// What is requested in the cycle that begins now.

@@ -1,12 +1,15 @@
 //! Roles of an application that is one of two MainDevices, and the state of the other one.
 
-use ringcat_engine::main_device::MainDeviceRole;
+use std::time::Duration;
+
+use ringcat_engine::main_device::{MainDeviceRole, SubDeviceId};
 use ringcat_engine::role::{Partner, RoleControl};
 use ringcat_engine::time::Instant;
 
 use super::{ForwardingCounters, Policy};
 use crate::acyclic::AcyclicHalf;
 use crate::application::Application;
+use crate::error::Error;
 use crate::links::Links;
 use crate::process_data::ProcessData;
 
@@ -39,9 +42,29 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     }
 
     /// Sets what decides about the role from the next cycle on; `None`: the application does, with requests
-    /// ([`Application::role_control`]). To be called before the cycles begin.
+    /// ([`Application::role_control`]). To be called before the cycles begin. SubDevices whose watchdog is shorter than
+    /// a takeover may last are reported ([`StandbyEvent::WatchdogTooShort`](super::StandbyEvent)).
     pub fn set_policy(&mut self, policy: Option<Policy>) {
         self.cyclic.set_policy(policy, &self.links);
+        if let Some(needed) = policy.and_then(|policy| self.longest_gap(&policy)) {
+            self.acyclic.report_watchdogs_below(needed, self.links.now());
+        }
+    }
+
+    /// The SubDevices with outputs whose watchdog, as declared, is shorter than a takeover with this policy may last,
+    /// and its time. They leave OP in a takeover. None if this policy does not take over.
+    ///
+    /// # Errors
+    /// The thread of the acyclic half has ended.
+    pub fn short_watchdogs(&self, policy: &Policy) -> Result<Vec<(SubDeviceId, Duration)>, Error> {
+        self.longest_gap(policy).map_or(Ok(Vec::new()), |needed| self.acyclic.watchdogs_below(needed))
+    }
+
+    /// How long process data may be missing in a takeover with this policy ([`Policy::longest_gap_of`]); `None` if it
+    /// does not take over, or this MainDevice is alone.
+    pub fn longest_gap(&self, policy: &Policy) -> Option<Duration> {
+        let is_of_two = self.cyclic.exchange.is_of_two() && policy.takes_over;
+        is_of_two.then(|| policy.longest_gap_of(self.cyclic.period()))
     }
 }
 

@@ -102,7 +102,15 @@ impl<C: Links> Listening<C> {
                 return Err(self.refused(error.into()));
             }
             let has_link = self.supervisor.ring_status().links.iter().any(|link| link.carrier != Some(false));
-            match joining.decide(&self.listener.heard(), has_link, self.links.now()) {
+            let (heard, now) = (self.listener.heard(), self.links.now());
+            if let Some(notice) = joining.look_out(&heard, now) {
+                // It does not wait: frames have to be forwarded.
+                let _ = self.supervisor.begin(move |engine, _| {
+                    engine.report_standby(notice.into(), now);
+                    Box::new(|_, _| true)
+                });
+            }
+            match joining.decide(&heard, has_link, now) {
                 Next::Listen => {}
                 Next::Follow => match self.follow(declare.clone()) {
                     Ok(Some(active)) => return Ok(self.run(active)),

@@ -3,9 +3,9 @@
 use ringcat_engine::event::{Event, StandbyEvent};
 use ringcat_engine::role::MainDeviceRole;
 
-use super::names::address;
+use super::names::{Names, address};
 
-pub(super) fn describe(event: &Event) -> Option<String> {
+pub(super) fn describe(event: &Event, names: &Names) -> Option<String> {
     let Event::Standby(event) = event else { return None };
     Some(match event {
         StandbyEvent::RoleChanged { role: MainDeviceRole::Active, cause } => {
@@ -39,6 +39,17 @@ pub(super) fn describe(event: &Event) -> Option<String> {
         StandbyEvent::KnowledgeTooLong { bytes, room } => format!(
             "the other MainDevice cannot follow: the knowledge of the segment has {bytes} bytes, at most {room}"
         ),
+        StandbyEvent::NoActive { silence } => format!(
+            "ALARM: no ACTIVE for {:.3} ms, and this MainDevice does not take over",
+            silence.as_secs_f64() * 1e3
+        ),
+        StandbyEvent::WatchdogTooShort { subdevice, watchdog, needed } => format!(
+            "{}: its watchdog of {:.1} ms is shorter than a takeover may last ({:.1} ms): it leaves OP in one",
+            names.of(*subdevice),
+            watchdog.as_secs_f64() * 1e3,
+            needed.as_secs_f64() * 1e3
+        ),
+        StandbyEvent::ActiveIsBack => "an ACTIVE is there again".to_owned(),
         StandbyEvent::RoleRefused(write) => {
             format!("the role does not change: {write}; a forced request would cut that off")
         }

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::time::Duration;
 
 use ringcat::simulated::two_hosts::HostLinks;
-use ringcat::standby::{Joining, Next, PartnerEndpoint, Policy, StandbyEvent, StandbyOptions};
+use ringcat::standby::{Joining, Next, OnCollision, PartnerEndpoint, Policy, StandbyEvent, StandbyOptions};
 use ringcat::{
     Application, DomainId, DomainState, Error, Event, Links, MainDevice, MainDeviceRole, Options, ProcessData, Scan,
     ScanError, automatic,
@@ -26,17 +26,33 @@ const LISTEN: Duration = Duration::from_millis(30);
 
 /// Joins, and writes the number of the cycle to all outputs, in either role.
 pub(super) fn member(links: HostLinks, board: &Board) {
-    run(links, board, LISTEN);
+    run(links, board, LISTEN, policy());
 }
 
 /// As [`member`], but it does not listen before it becomes ACTIVE for the first time.
 pub(super) fn eager_member(links: HostLinks, board: &Board) {
-    run(links, board, Duration::ZERO);
+    run(links, board, Duration::ZERO, policy());
 }
 
-fn run(mut links: HostLinks, board: &Board, listen: Duration) {
+/// As [`member`], but it takes over on request only.
+pub(super) fn permanent_standby(links: HostLinks, board: &Board) {
+    let mut policy = policy();
+    policy.takes_over = false;
+    run(links, board, LISTEN, policy);
+}
+
+/// As [`member`], but in a collision it becomes INACTIVE whatever the addresses are.
+pub(super) fn yielding_member(links: HostLinks, board: &Board) {
+    run(links, board, LISTEN, policy().with_on_collision(OnCollision::Yield));
+}
+
+fn policy() -> Policy {
+    Policy::default().with_time_out(TIME_OUT_CYCLES, Duration::ZERO).with_listen(LISTEN)
+}
+
+fn run(mut links: HostLinks, board: &Board, listen: Duration, policy: Policy) {
     links.switch(true);
-    let failure = exchange(links, board, listen).err();
+    let failure = exchange(links, board, listen, policy).err();
     board.note(|seen| {
         seen.phase = Phase::Ended;
         seen.failure = failure.map(|error| error.to_string());
@@ -73,10 +89,9 @@ struct Shown {
     age: Option<u64>,
 }
 
-fn exchange(links: HostLinks, board: &Board, listen: Duration) -> Result<(), Error> {
+fn exchange(links: HostLinks, board: &Board, listen: Duration, policy: Policy) -> Result<(), Error> {
     let most = if board.says() > 0 { MAX_ACYCLIC } else { 0 };
     let options = Options::default().with_standby(StandbyOptions::default().with_max_acyclic(most));
-    let policy = Policy::default().with_time_out(TIME_OUT_CYCLES, Duration::ZERO).with_listen(LISTEN);
     let mut main_device = MainDevice::request(links, &options);
     let mut talk = Talk::new(&mut main_device);
     let joining = Joining::begin(&main_device, &policy.with_listen(listen));
@@ -119,7 +134,12 @@ fn join(
     loop {
         main_device.listen(SLICE)?;
         talk.step(board);
-        match joining.next(&main_device) {
+        while let Some(event) = main_device.pop_event() {
+            if let Event::Standby(event) = event.event {
+                board.note(|seen| seen.events.push(format!("{event:?}")));
+            }
+        }
+        match joining.next(&mut main_device) {
             Next::Follow => return Ok(main_device.follow(declare)?),
             Next::BecomeActive => {
                 let now = main_device.now();

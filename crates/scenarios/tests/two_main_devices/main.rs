@@ -2,6 +2,7 @@
 //! role over (protocol 9.6 to 9.10).
 
 mod adoption;
+mod alarm;
 mod clocks;
 mod collisions;
 mod ethernet;
@@ -16,6 +17,7 @@ mod rows;
 mod same_identity;
 mod taking_over;
 mod threads;
+mod watchdogs;
 
 use std::time::Duration;
 
