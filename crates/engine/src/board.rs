@@ -267,6 +267,12 @@ impl Board {
         self.live.is_silent(self.supervision_count.load(Ordering::Acquire))
     }
 
+    /// Posts that the ACTIVE does not report any more: no SubDevice is known to be present.
+    #[cfg(feature = "standby")]
+    pub(crate) fn post_unheard(&self) {
+        self.live.post_unheard(self.supervision_count.load(Ordering::Acquire));
+    }
+
     /// Posts the carriers of the links.
     pub(crate) fn post_carriers(&self, carriers: [Option<bool>; 2]) {
         self.live.post_carriers(carriers);

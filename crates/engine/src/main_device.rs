@@ -314,7 +314,7 @@ impl MainDevice {
 
     /// The present state of each declared SubDevice.
     pub fn states(&self) -> Vec<SubDeviceState> {
-        self.segment.view().members().map(|member| member.phase.into()).collect()
+        self.segment.view().members().map(|member| self.known_state(member.phase)).collect()
     }
 
     /// Status of each clock of the segment, by position; empty without distributed clocks.
@@ -336,6 +336,7 @@ impl MainDevice {
     pub fn all_settled(&self) -> bool {
         let access = self.segment.view();
         access.is_active()
+            && self.are_states_known()
             && access
                 .members()
                 .all(|m| matches!(m.phase, Phase::Settled(_)) || (m.config.optional && m.phase == Phase::Absent))
@@ -345,6 +346,7 @@ impl MainDevice {
     pub fn mandatory_settled(&self) -> bool {
         let access = self.segment.view();
         access.is_active()
+            && self.are_states_known()
             && access.members().all(|member| member.config.optional || matches!(member.phase, Phase::Settled(_)))
     }
 

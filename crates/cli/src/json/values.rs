@@ -88,7 +88,7 @@ pub struct State {
     pub subdevice: usize,
     /// Its name
     pub name: String,
-    /// `absent`, `configuring`, or its AL state: `INIT`, `PREOP`, `BOOT`, `SAFEOP`, `OP`
+    /// `absent`, `unknown`, `configuring`, or its AL state: `INIT`, `PREOP`, `BOOT`, `SAFEOP`, `OP`
     pub state: String,
 }
 
@@ -100,6 +100,7 @@ impl State {
             name: names.get(subdevice).cloned().unwrap_or_default(),
             state: match state {
                 SubDeviceState::Absent => "absent".to_owned(),
+                SubDeviceState::Unknown => "unknown".to_owned(),
                 SubDeviceState::Settled(state) => al_state(*state),
                 _ => "configuring".to_owned(),
             },

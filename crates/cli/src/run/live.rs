@@ -146,6 +146,7 @@ fn ring_lines(status: &RingStatus, names: &Names) -> Vec<String> {
 pub fn word(state: SubDeviceState) -> String {
     match state {
         SubDeviceState::Absent => "does not answer".to_owned(),
+        SubDeviceState::Unknown => "unknown: no ACTIVE".to_owned(),
         SubDeviceState::Settled(state) => state.to_string(),
         _ => "is being configured".to_owned(),
     }

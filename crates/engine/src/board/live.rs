@@ -189,6 +189,13 @@ impl LiveWords {
         self.silence.store(number << 8 | losses.min(LOSSES), Ordering::Relaxed);
     }
 
+    /// The ACTIVE has not reported anything since the result with this number: what it reported last is kept for a
+    /// takeover, and is not known any more to readers.
+    #[cfg(feature = "standby")]
+    pub(super) fn post_unheard(&self, number: u64) {
+        self.silence.store(number << 8 | LOSSES, Ordering::Relaxed);
+    }
+
     /// No supervision frame follows the result with this number: nothing is known of SubDevices and links any more.
     pub(super) fn post_end(&self, number: u64) {
         self.silence.store(number << 8 | LOSSES, Ordering::Relaxed);

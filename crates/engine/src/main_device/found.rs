@@ -57,11 +57,11 @@ impl MainDevice {
     pub fn unsettled(&self) -> alloc::vec::Vec<(SubDeviceId, SubDeviceState)> {
         let access = self.segment.view();
         let members = access.members().enumerate();
-        let states = members.map(|(index, member)| (index, member.phase.into(), member.config.optional));
+        let states = members.map(|(index, member)| (index, self.known_state(member.phase), member.config.optional));
         let unsettled = states.filter(|(_, state, optional)| match state {
             SubDeviceState::Settled(_) => false,
             SubDeviceState::Absent => !optional,
-            SubDeviceState::Configuring => true,
+            SubDeviceState::Configuring | SubDeviceState::Unknown => true,
         });
         unsettled.map(|(index, state, _)| (SubDeviceId(index), state)).collect()
     }

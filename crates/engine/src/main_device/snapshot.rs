@@ -59,6 +59,8 @@ pub enum Progress {
     Undeclared,
     /// It does not answer.
     Absent,
+    /// It is not known: no ACTIVE reports it to this INACTIVE.
+    Unknown,
     /// It is being configured, or waits for the next attempt.
     Configuring,
     /// It is in its target state.
@@ -282,7 +284,7 @@ impl MainDevice {
             found.map(|info| info.position.0)
         };
         let members = view.members().enumerate().map(|(index, member)| {
-            let snapshot = of_member((index, member));
+            let snapshot = of_member(index, &member, self.known_state(member.phase));
             (Addressed::Member(index), SubDeviceSnapshot { position: position(snapshot.station), ..snapshot })
         });
         let others = view.subdevices().unassigned().filter(UnassignedView::is_undeclared);
@@ -307,12 +309,13 @@ impl MainDevice {
     }
 }
 
-fn of_member((index, member): (usize, MemberView<'_>)) -> SubDeviceSnapshot {
+fn of_member(index: usize, member: &MemberView<'_>, state: SubDeviceState) -> SubDeviceSnapshot {
     SubDeviceSnapshot {
         declared: Some(index),
         station: member.station.0,
-        progress: match SubDeviceState::from(member.phase) {
+        progress: match state {
             SubDeviceState::Absent => Progress::Absent,
+            SubDeviceState::Unknown => Progress::Unknown,
             SubDeviceState::Configuring => Progress::Configuring,
             SubDeviceState::Settled(_) => Progress::Settled,
         },

@@ -2,6 +2,9 @@
 
 use ringcat_wire::al::AlState;
 
+use super::MainDevice;
+#[cfg(feature = "standby")]
+use crate::role::MainDeviceRole;
 use crate::segment::member::Phase;
 
 /// State of a declared SubDevice.
@@ -10,6 +13,8 @@ use crate::segment::member::Phase;
 pub enum SubDeviceState {
     /// It does not answer.
     Absent,
+    /// It is not known: this MainDevice is INACTIVE in a ring of two, and no ACTIVE reports states.
+    Unknown,
     /// It is being configured, or waits for the next attempt.
     Configuring,
     /// It is in its target state.
@@ -32,6 +37,22 @@ impl GroupState {
     /// All of them are in their declared states.
     pub const fn has_joined(&self) -> bool {
         self.settled == self.members
+    }
+}
+
+impl MainDevice {
+    /// Whether states of SubDevices are known: an INACTIVE has them from the ACTIVE, while there is one.
+    pub(super) fn are_states_known(&self) -> bool {
+        #[cfg(feature = "standby")]
+        let is_known = self.role() == MainDeviceRole::Active || !self.segment.board.is_silent();
+        #[cfg(not(feature = "standby"))]
+        let is_known = true;
+        is_known
+    }
+
+    /// The state of a SubDevice that has this phase in the model.
+    pub(super) fn known_state(&self, phase: Phase) -> SubDeviceState {
+        if self.are_states_known() { phase.into() } else { SubDeviceState::Unknown }
     }
 }
 

@@ -153,9 +153,10 @@ fn a_subdevice_gone_before_a_takeover_is_missing_one_that_goes_with_it_is_lost()
         two.run(3 * CYCLE);
         two.controllers[1].request(RoleRequest::Active);
         two.run(Duration::from_millis(300));
-        let lost = |it: &ringcat::TimedEvent| it.event == Event::Lost { subdevice: SubDeviceId(0) };
-        let is_reported = two.controllers[1].events.iter().any(lost);
-        assert_eq!(is_reported, !before, "{}", two.log());
+        let count = |event: &Event| two.controllers[1].events.iter().filter(|it| it.event == *event).count();
+        let missing = Event::Missing { subdevice: SubDeviceId(0), optional: false };
+        let reported = [count(&missing), count(&Event::Lost { subdevice: SubDeviceId(0) })];
+        assert_eq!(reported, if before { [1, 0] } else { [0, 1] }, "{}", two.log());
         let unsettled = two.controllers[1].engine.unsettled();
         assert!(unsettled.iter().any(|(subdevice, _)| subdevice.0 == 0), "{unsettled:?}\n{}", two.log());
         two.fault(Fault::PowerOn(DeviceIndex(0)));

@@ -5,7 +5,7 @@ use std::time::Duration;
 use ringcat::standby::StandbyEvent;
 use ringcat::standby::{Partner, RoleRequest};
 use ringcat::{ActivateError, Denial};
-use ringcat::{Function, Limits, MainDeviceRole, SubDeviceId};
+use ringcat::{Function, Limits, MainDeviceRole, SubDeviceId, SubDeviceState};
 use ringcat_sim::cable::{CableId, Host};
 use ringcat_sim::fault::Fault;
 use ringcat_wire::al::AlState;
@@ -71,6 +71,30 @@ fn states_and_counts_of_the_inactive_are_those_of_the_active() {
     let [ours, theirs] = [first.engine.ring_status(), second.engine.ring_status()];
     assert_eq!(ours.state, theirs.state);
     assert_eq!(ours.links.map(|link| link.answering), theirs.links.map(|link| link.answering));
+}
+
+// covers: REQ032, MR-25, standby
+#[test]
+fn states_of_an_inactive_are_unknown_as_long_as_no_active_reports_them() {
+    let mut two = followed();
+    two.run(Duration::from_millis(100));
+    let known = two.controllers[0].engine.states();
+    let live = two.controllers[1].engine.live_status();
+    let online = || (0..8).filter(|subdevice| live.subdevice(SubDeviceId(*subdevice)).is_some_and(|it| it.online));
+    assert_eq!((two.controllers[1].engine.states(), online().count()), (known.clone(), 8));
+    two.kill(0);
+    two.run(4 * CYCLE);
+    assert_eq!(two.controllers[1].engine.states(), known, "single cycles may be lost");
+    two.run(3 * CYCLE);
+    let inactive = &two.controllers[1].engine;
+    assert_eq!((inactive.states(), online().count()), (vec![SubDeviceState::Unknown; 8], 0), "{}", two.log());
+    assert_eq!((inactive.unsettled().len(), inactive.all_settled()), (8, false));
+    assert_eq!(live.segment().responding, 0);
+    // What was reported is still what it goes on with.
+    two.controllers[1].request(RoleRequest::Active);
+    two.run(20 * CYCLE);
+    assert!(two.controllers[1].engine.all_settled() && two.left_op.is_empty(), "{}", two.log());
+    assert_eq!((two.controllers[1].engine.states(), online().count()), (known, 8));
 }
 
 // covers: MR-14, MR-19, REQ045, standby

@@ -80,6 +80,9 @@ impl State {
         let limit = self.period_ns.saturating_mul(WHOLE_WITHIN);
         let whole = self.following.whole();
         let is_late = whole.is_none_or(|whole| now.since(whole.at).as_nanos() > u128::from(limit));
+        if is_late {
+            board.post_unheard();
+        }
         let header = whole.map(|whole| whole.header);
         let is_down = |link: &Link| board.live.carrier(*link) == Some(false);
         let is_other = header.is_some_and(|header| !self.items.is_same(header.identity));

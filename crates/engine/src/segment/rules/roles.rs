@@ -5,6 +5,8 @@ use alloc::vec::Vec;
 use ringcat_wire::al::{AlState, AlStatus};
 
 use crate::board::live::{Life, Presence};
+use crate::declared::SubDeviceId;
+use crate::event::Event;
 use crate::segment::attention::Attention;
 use crate::segment::effect::{Check, Effects, Watch};
 use crate::segment::key::SubDeviceKey;
@@ -42,17 +44,19 @@ impl Segment {
         self.begin_watches(Watch::AdoptedClocks, effects);
         for (index, life) in lives.iter().enumerate() {
             match life.presence {
-                Presence::Offline => self.expect_absent(index),
+                Presence::Offline => self.expect_absent(index, effects),
                 Presence::Configuring | Presence::Settled => self.adopt_member(index, *life, effects),
             }
         }
         self.attention.want();
     }
 
-    /// A member that did not answer to the other MainDevice.
-    fn expect_absent(&mut self, index: usize) {
+    /// A member that did not answer to the other MainDevice. That is reported here as well (protocol MR-23): events of
+    /// the other one are not known to this application.
+    fn expect_absent(&mut self, index: usize, effects: &mut Effects) {
         let Some(member) = self.subdevices.member_mut(index) else { return };
         member.phase = Phase::Absent;
+        effects.report(Event::Missing { subdevice: SubDeviceId(index), optional: member.config.optional });
         let is_excused = !member.exchanges(member.target);
         self.board.set_taking_part(index, false);
         self.board.set_excused(index, is_excused);
