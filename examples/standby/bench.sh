@@ -12,6 +12,8 @@ names=(c1 c2 plant pc)
 next_index=50
 # Process of each controller, and how much of its log was shown.
 pids=("" "" "")
+# Not empty: it was asked to end.
+ending=("" "" "")
 shown=(0 0 0)
 steps=0
 held=0
@@ -102,6 +104,25 @@ start() {
         "${role[@]}" "${thread[@]}" "${@:2}" >>"$files/$name" 2>&1 </dev/null &
     set +m
     pids[$1]=$!
+    ending[$1]=""
+}
+
+# ask_to_end NUMBER: Ctrl-C on this controller. `ask_all_to_end NUMBER`: SIGTERM to the program and its guard, which is
+# how systemd stops a service.
+ask_to_end() {
+    ending[$1]=yes
+    kill -INT "${pids[$1]}"
+}
+ask_all_to_end() {
+    local processes
+    ending[$1]=yes
+    mapfile -t processes < <(ip netns pids "$prefix-c$1")
+    kill -TERM "${processes[@]}"
+}
+
+# runs NUMBER: whether the controller runs as far as it should.
+runs() {
+    [[ -z ${pids[$1]} || -n ${ending[$1]} ]] || ! ended "$1"
 }
 
 # ended NUMBER: whether the program on this controller has ended.
@@ -166,7 +187,7 @@ is_off() {
 
 # reaches NAME ADDRESS: whether IP passes.
 reaches() {
-    (within "$1" python3 "$here/ping.py" "$2" 3) >>"$files/pings" 2>&1
+    (within "$1" python3 "$here/ping.py" "$2" 3 2>&1 | sed "s/^/$1: /" >>"$files/pings")
 }
 
 # are STATE NUMBER...: whether these SubDevices are in this state.
@@ -204,6 +225,8 @@ await() {
     local until=$((SECONDS + limit))
     while ! "${@:2}"; do
         [[ ! -e $files/verdict ]] || exit 1
+        runs 1 || { show; fail "controller 1 has ended, expected: $1"; }
+        runs 2 || { show; fail "controller 2 has ended, expected: $1"; }
         ((SECONDS < until)) || { show; fail "not within $limit s: $1"; }
         wire
         sleep 0.05
