@@ -11,3 +11,5 @@ mod exit_codes;
 mod files;
 mod json;
 mod pages;
+#[cfg(feature = "standby")]
+mod service;

@@ -26,6 +26,7 @@ mod mail_captures;
 mod messages;
 mod running;
 mod said;
+mod scripts;
 mod takeover;
 mod taps;
 
