@@ -83,7 +83,7 @@ fn states_of_an_inactive_are_unknown_as_long_as_no_active_reports_them() {
     let online = || (0..8).filter(|subdevice| live.subdevice(SubDeviceId(*subdevice)).is_some_and(|it| it.online));
     assert_eq!((two.controllers[1].engine.states(), online().count()), (known.clone(), 8));
     two.kill(0);
-    two.run(4 * CYCLE);
+    two.run(3 * CYCLE);
     assert_eq!(two.controllers[1].engine.states(), known, "single cycles may be lost");
     two.run(3 * CYCLE);
     let inactive = &two.controllers[1].engine;
