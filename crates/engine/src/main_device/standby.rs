@@ -93,7 +93,7 @@ impl Standby {
     /// Whether Ethernet frames for the other MainDevice wait since it was determined last what is due. Cheap.
     #[inline]
     pub fn has_frames(&self) -> bool {
-        self.ethernet.as_ref().is_some_and(PartnerEthernet::has_news)
+        self.ethernet.as_ref().is_some_and(PartnerEthernet::has_frames)
     }
 }
 

@@ -72,7 +72,7 @@ impl SupervisorThread {
         let (published, mut declare) = (self.0.published.clone(), Some(declare));
         self.ask(move |engine: &mut Engine| {
             let declare = declare.take()?;
-            let known = engine.heard_knowledge().zip(engine.heard_configuration()).zip(engine.heard_scan());
+            let known = engine.partner_knowledge().zip(engine.partner_configuration()).zip(engine.partner_scan());
             let followed =
                 known.map(|((knowledge, (session, _)), scan)| engine.follow(declare(&scan), knowledge, session));
             published.states_of(engine);
@@ -102,7 +102,7 @@ impl<C: Links> Listening<C> {
                 return Err(self.refused(error.into()));
             }
             let has_link = self.supervisor.ring_status().links.iter().any(|link| link.carrier != Some(false));
-            match joining.decide(&self.listener.heard(), has_link, self.links.now()) {
+            match joining.decide(&self.listener.partner_status(), has_link, self.links.now()) {
                 Next::Listen => {}
                 Next::Follow => match self.follow(declare.clone()) {
                     Ok(Some(active)) => return Ok(self.run(active)),

@@ -32,7 +32,7 @@ pub(crate) struct PartnerEthernet {
     pub(super) figures: Arc<Figures>,
     /// Stream and number of the last Ethernet frame that was taken.
     pub(super) taken: Option<(u32, u32)>,
-    /// When the other MainDevice was heard last.
+    /// When a frame of the other MainDevice came last.
     pub(super) sign_at: Option<Instant>,
     /// When an Ethernet frame has left or arrived last.
     pub(super) traffic_at: Option<Instant>,
@@ -119,7 +119,7 @@ impl PartnerEthernet {
         }
     }
 
-    /// The other MainDevice was heard.
+    /// A frame of the other MainDevice has come.
     pub(super) fn note_sign(&mut self, now: Instant) {
         self.sign_at = Some(now);
         if !self.figures.is_up.load(Ordering::Relaxed) {

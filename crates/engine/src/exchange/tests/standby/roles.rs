@@ -147,5 +147,5 @@ fn an_inactive_never_takes_over_by_itself() {
         duo.now += PERIOD;
         assert_eq!(duo.second.exchange.begin_role(duo.now), None);
     }
-    assert!(!duo.second.is_active() && duo.second.exchange.heard_at().is_some_and(|at| at < duo.now));
+    assert!(!duo.second.is_active() && duo.second.exchange.partner_data_at().is_some_and(|at| at < duo.now));
 }
