@@ -64,7 +64,7 @@ impl MainDevice {
 
     /// What the ACTIVE has measured of the segment: its counters, carriers and domains (protocol MR-14, MR-19), as of
     /// the last cycle that has arrived as a whole; `None` before one, and without the options of MainDevice redundancy.
-    /// [`PartnerDiagnosis::at`] says how old it is: without an ACTIVE it remains.
+    /// [`PartnerDiagnosis::at`] shows how old it is: without an ACTIVE it remains.
     pub fn partner_diagnosis(&self) -> Option<PartnerDiagnosis> {
         let words = &self.standby.as_ref()?.words;
         let (_, bytes) = words.diagnosis.copy()?;

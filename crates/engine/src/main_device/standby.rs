@@ -42,7 +42,7 @@ pub(super) struct Standby {
     pub published: Option<Marks>,
     /// Ethernet between both MainDevices.
     pub ethernet: Option<PartnerEthernet>,
-    /// Its end for the application, until that takes it.
+    /// Its endpoint for the application, until that takes it.
     pub endpoint: Option<PartnerEndpoint>,
 }
 

@@ -108,12 +108,12 @@ impl Board {
         self.request.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
-    /// The program is to have Ethernet to the other one, and to send so many frames in each cycle.
+    /// The program is to have Ethernet to the other one, and to send this number of frames in each cycle.
     pub fn set_frames_per_cycle(&self, frames: usize) {
         self.frames_per_cycle.store(frames, Ordering::Relaxed);
     }
 
-    /// How many.
+    /// That number.
     pub fn frames_per_cycle(&self) -> usize {
         self.frames_per_cycle.load(Ordering::Relaxed)
     }

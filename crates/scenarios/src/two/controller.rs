@@ -49,7 +49,7 @@ pub struct Controller {
     settings: Settings,
     /// Its acyclic half.
     pub engine: Engine,
-    /// The end of its Ethernet to the other one, with `max_acyclic`.
+    /// The endpoint of its Ethernet to the other one, with `max_acyclic`.
     pub endpoint: Option<PartnerEndpoint>,
     control: RoleControl,
     running: Option<Running>,

@@ -14,7 +14,7 @@ pub struct EthernetTraffic {
 }
 
 impl EthernetTraffic {
-    /// Of so many frames per step in each direction.
+    /// Of this number of frames per step in each direction.
     pub fn new(frames: usize) -> EthernetTraffic {
         EthernetTraffic { sides: [EthernetPeer::new(0, 0), EthernetPeer::new(1, 0)], starts: 0, frames }
     }

@@ -190,7 +190,7 @@ fn lost_frames_cost_ethernet_frames_and_never_bring_one_twice_or_in_another_orde
     let sent = traffic.sides.each_ref().map(|side| side.sent);
     assert!(missing.iter().zip(sent).all(|(missing, sent)| missing * 20 < sent), "{traffic:?}");
     let counted = two.controllers.each_ref().map(|it| it.endpoint.as_ref().map(|it| it.traffic().missed));
-    assert_eq!(counted, [Some(missing[1]), Some(missing[0])], "each knows what it has missed");
+    assert_eq!(counted, [Some(missing[1]), Some(missing[0])], "each has counted what it has missed");
 }
 
 // covers: AC-03, AC-06, standby

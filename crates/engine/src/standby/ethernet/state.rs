@@ -43,7 +43,7 @@ pub(crate) struct PartnerEthernet {
 }
 
 impl PartnerEthernet {
-    /// With at most so many master frames per cycle, and its end for the application.
+    /// With at most this number of master frames per cycle, and its endpoint for the application.
     pub fn new(identity: Identity, most: u8, now: Instant) -> (PartnerEthernet, PartnerEndpoint) {
         let (producer, outgoing) = frame_queue(ETHERNET_QUEUE as u32);
         let (incoming, consumer) = frame_queue(ETHERNET_QUEUE as u32);
