@@ -13,12 +13,13 @@ use super::MainDeviceRole;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum RoleRequest {
-    /// It becomes ACTIVE with the next cycle, whatever the other MainDevice does.
+    /// It becomes ACTIVE with the next cycle, whatever the other MainDevice does. One that is ACTIVE stays it, and
+    /// withdraws an offer of its role that is under way.
     Active,
     /// It becomes INACTIVE with the next cycle, whether or not the other MainDevice takes over.
     Inactive,
-    /// It becomes INACTIVE as soon as the other MainDevice goes on in the cycle after: no cycle is lost. Needs the
-    /// feature `standby`.
+    /// It becomes INACTIVE as soon as the other MainDevice goes on in the cycle after: no cycle is lost. While that is
+    /// under way, the same request again changes nothing. Needs the feature `standby`.
     HandOver,
 }
 

@@ -154,13 +154,23 @@ impl State {
         }
     }
 
-    /// Begins to offer the role.
+    /// Begins to offer the role. An offer that was made stays as it is: after its last cycle this MainDevice yields.
     pub(super) fn begin_offer(&mut self, events: &mut Producer) {
+        if self.frames.header.phase != Phase::Goes {
+            return;
+        }
         let partner = self.watch.partner();
         if matches!(partner, Partner::Alive { .. }) && partner.is_ready() {
             (self.offered, self.frames.header.phase) = (0, Phase::Offers);
         } else {
             events.push(CyclicStandbyEvent::HandOverRefused(partner).pack());
+        }
+    }
+
+    /// The role is not offered any more, unless the last cycle of this MainDevice has gone.
+    pub(super) fn withdraw_offer(&mut self) {
+        if self.frames.header.phase == Phase::Offers {
+            self.frames.header.phase = Phase::Goes;
         }
     }
 }

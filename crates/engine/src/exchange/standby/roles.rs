@@ -45,8 +45,10 @@ impl Exchange {
         let request = if state.control.is_requested() { state.permitted_request(now, &mut self.events) } else { None };
         let change = match state.role {
             MainDeviceRole::Active => {
-                if request == Some(RoleRequest::HandOver) {
-                    state.begin_offer(&mut self.events);
+                match request {
+                    Some(RoleRequest::HandOver) => state.begin_offer(&mut self.events),
+                    Some(RoleRequest::Active) => state.withdraw_offer(),
+                    Some(RoleRequest::Inactive) | None => {}
                 }
                 let is_down = |link: &Link| self.board.live.carrier(*link) == Some(false);
                 let is_alone = state.yields_without_links && Link::ALL.iter().all(is_down);

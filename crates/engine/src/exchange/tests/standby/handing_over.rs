@@ -49,6 +49,43 @@ fn a_role_that_is_handed_over_costs_no_cycle_and_no_output_goes_back() {
     }
 }
 
+// covers: MR-07, REQ015, standby
+#[test]
+fn a_request_in_each_cycle_hands_the_role_over_as_soon_as_one_does() {
+    let cycles_of = |is_repeated: bool| {
+        let mut duo = Duo::new(MasterSizes::default());
+        count(&mut duo, 0, 5);
+        duo.received.iter_mut().for_each(std::vec::Vec::clear);
+        duo.first.control.request(RoleRequest::HandOver);
+        let mut cycles = 0;
+        while duo.first.is_active() {
+            count(&mut duo, 5 + cycles, 1);
+            cycles += 1;
+            assert!(cycles < 20, "the role is never handed over");
+            if is_repeated {
+                duo.first.control.request(RoleRequest::HandOver);
+            }
+        }
+        assert!(duo.second.is_active());
+        duo.received.iter().for_each(|received| assert_eq!(received.len(), usize::from(cycles), "{received:?}"));
+        cycles
+    };
+    assert_eq!(cycles_of(true), cycles_of(false));
+}
+
+// covers: MR-07, standby
+#[test]
+fn a_request_to_stay_active_withdraws_an_offer() {
+    let mut duo = Duo::new(MasterSizes::default());
+    count(&mut duo, 0, 5);
+    duo.first.control.request(RoleRequest::HandOver);
+    count(&mut duo, 5, 1);
+    duo.first.control.request(RoleRequest::Active);
+    count(&mut duo, 6, 20);
+    assert!(duo.first.is_active() && !duo.second.is_active());
+    duo.received.iter().for_each(|received| assert_eq!(received.len(), 26));
+}
+
 // covers: MR-07, standby
 #[test]
 fn a_role_that_the_other_one_does_not_take_is_kept_and_that_is_reported() {
