@@ -47,32 +47,33 @@ pub fn check_frames<'a>(names: impl Iterator<Item = &'a str>) -> Result<(), Fail
         sniffers.push((name, Sniffer::open(name, false)?, None));
     }
     let begin = Instant::now();
-    while begin.elapsed() < LISTEN && sniffers.iter().any(|(.., heard)| heard.is_none()) {
+    while begin.elapsed() < LISTEN && sniffers.iter().any(|(.., frame)| frame.is_none()) {
         let sockets: Vec<&PacketSocket> = sniffers.iter().map(|(_, sniffer, _)| sniffer.socket()).collect();
         let rest = LISTEN.saturating_sub(begin.elapsed()).as_nanos() as u64;
         ringcat_link::wait(&sockets, monotonic::now_ns() + rest, ReceiveMode::Blocking);
-        for (_, sniffer, heard) in &mut sniffers {
+        for (_, sniffer, frame) in &mut sniffers {
             while sniffer.next(&mut |passed| {
                 if begin.elapsed() >= LAST_FRAMES && has_commands(passed.frame) {
-                    *heard = address_of_sender(passed.frame).map(|source| (source, passed.direction));
+                    *frame = address_of_sender(passed.frame).map(|source| (source, passed.direction));
                 }
-            }) && heard.is_none()
+            }) && frame.is_none()
             {}
         }
     }
-    let found = sniffers.iter().filter_map(|(name, _, heard)| Some(Heard { name, heard: (*heard)? }.to_string()));
+    let found =
+        sniffers.iter().filter_map(|(name, _, frame)| Some(ForeignFrame { name, frame: (*frame)? }.to_string()));
     refuse(&found.collect::<Vec<_>>())
 }
 
 /// A frame that passed an interface.
-struct Heard<'a> {
+struct ForeignFrame<'a> {
     name: &'a str,
-    heard: (MacAddress, Direction),
+    frame: (MacAddress, Direction),
 }
 
-impl fmt::Display for Heard<'_> {
+impl fmt::Display for ForeignFrame<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (source, direction) = self.heard;
+        let (source, direction) = self.frame;
         let way = match direction {
             Direction::In => "arrive on",
             Direction::Out => "leave through",
@@ -95,7 +96,7 @@ mod tests {
         let text = refuse(&["a".to_owned(), "b".to_owned()]).expect_err("refused").to_string();
         assert!(text.starts_with("a\nb\nnothing was sent") && text.contains("--force"), "{text}");
         let source = MacAddress([2, 0, 0, 0, 0, 7]);
-        let heard = Heard { name: "eth1", heard: (source, Direction::Out) }.to_string();
-        assert!(heard.ends_with("its frames, from 02:00:00:00:00:07, leave through eth1"), "{heard}");
+        let text = ForeignFrame { name: "eth1", frame: (source, Direction::Out) }.to_string();
+        assert!(text.ends_with("its frames, from 02:00:00:00:00:07, leave through eth1"), "{text}");
     }
 }

@@ -9,9 +9,9 @@
 mod beating;
 mod counters;
 mod ethernet;
+mod event_report;
 pub mod guarding;
 mod joining;
-mod news;
 mod options;
 mod takeover;
 

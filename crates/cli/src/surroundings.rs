@@ -124,17 +124,17 @@ fn listen(interfaces: &InterfaceArguments, links: &PacketLinks, found: Arc<OnceL
     let body = move || {
         let names: Vec<&str> = links.all().collect();
         let Ok(listener) = Listener::open(Sender { address: main.0, mask: unmarked(codec) }, &names) else { return };
-        while let Some(heard) = listener.hear(&end) {
-            if matches!(identity.classify(&heard.bytes), Classified::Ours(_)) {
+        while let Some(frame) = listener.receive(&end) {
+            if matches!(identity.classify(&frame.bytes), Classified::Ours(_)) {
                 warn(format_args!(
                     "frames sent on {} arrive on {}: a cable of this segment, such as the other end of a ring, is \
                      plugged in there; {}",
                     links.main,
-                    heard.interface,
-                    links.advice(&heard.interface)
+                    frame.interface,
+                    links.advice(&frame.interface)
                 ));
                 // Only this thread sets it, and once.
-                let _ = found.set(heard.interface);
+                let _ = found.set(frame.interface);
                 return;
             }
         }

@@ -85,7 +85,7 @@ pub use ethernet::EthernetSubDevice;
 pub use found::DeclaredSubDevice;
 pub use image_memory::ImageMemory;
 #[cfg(feature = "standby")]
-pub use listener::{Heard, HeardDiagnosis, Listener};
+pub use listener::{Listener, PartnerDiagnosis, PartnerStatus};
 pub use live_status::{LiveStatus, LostCopies, SegmentStatus, SubDeviceStatus, WkcShare};
 pub use options::Options;
 pub use pending::Pending;

@@ -41,7 +41,7 @@ pub struct Sender {
 
 /// A received frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Heard {
+pub struct ReceivedFrame {
     /// Name of the interface that it arrived on.
     pub interface: String,
     /// Its first bytes, at most [`KEPT`].
@@ -83,7 +83,7 @@ impl Listener {
     }
 
     /// Waits for a frame; `None` if `end` becomes readable or its other side closes, or if the kernel fails.
-    pub fn hear(&self, end: &impl AsFd) -> Option<Heard> {
+    pub fn receive(&self, end: &impl AsFd) -> Option<ReceivedFrame> {
         loop {
             let place = |fd| libc::pollfd { fd, events: libc::POLLIN, revents: 0 };
             let mut polled = [place(self.fd.as_raw_fd()), place(end.as_fd().as_raw_fd())];
@@ -93,8 +93,8 @@ impl Listener {
                 return None;
             }
             if result > 0 {
-                match receive(self.fd.as_raw_fd()) {
-                    Ok(heard) => return Some(heard),
+                match take(self.fd.as_raw_fd()) {
+                    Ok(frame) => return Some(frame),
                     Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
                     // One of the interfaces went down: the socket keeps working for the others, and the interface may
                     // come back.
@@ -106,7 +106,7 @@ impl Listener {
     }
 }
 
-fn receive(fd: RawFd) -> io::Result<Heard> {
+fn take(fd: RawFd) -> io::Result<ReceivedFrame> {
     let mut bytes = vec![0; KEPT];
     // SAFETY: all bytes zero is a valid sockaddr_ll.
     let mut from: libc::sockaddr_ll = unsafe { zeroed() };
@@ -121,7 +121,7 @@ fn receive(fd: RawFd) -> io::Result<Heard> {
     }
     bytes.truncate(received as usize);
     let index = from.sll_ifindex as u32;
-    Ok(Heard { interface: interface::name_of(index).unwrap_or_else(|| format!("interface {index}")), bytes })
+    Ok(ReceivedFrame { interface: interface::name_of(index).unwrap_or_else(|| format!("interface {index}")), bytes })
 }
 
 /// Whether an interface lies on top of another interface.

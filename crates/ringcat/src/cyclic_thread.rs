@@ -73,6 +73,13 @@ fn message(payload: &(dyn Any + Send)) -> String {
     text.unwrap_or_else(|| "without a message".to_owned())
 }
 
+impl<L: Links> Application<L, SupervisorThread> {
+    /// The acyclic half, also for other threads: the handle can be copied.
+    pub fn supervisor(&self) -> &SupervisorThread {
+        &self.acyclic
+    }
+}
+
 impl<L: Links + Send + 'static> Application<L, SupervisorThread> {
     /// Runs the cycles in their own thread. Each cycle calls `work`, until it returns `Break` or [`CyclicThread::end`]
     /// is called. `prepare` runs in the thread first, for example to set its priority and processor. `work` is in the

@@ -4,12 +4,10 @@ use core::fmt;
 use std::time::Duration;
 
 use ringcat_engine::BusError;
-use ringcat_engine::ConfigureError;
 use ringcat_engine::ScanError;
 use ringcat_engine::ServiceError;
 use ringcat_engine::StatesError;
 use ringcat_engine::StopError;
-use ringcat_engine::mail::coe::SdoError;
 use ringcat_engine::main_device::ActivateError;
 #[cfg(feature = "sim")]
 use ringcat_sim::segment::SegmentError;
@@ -27,10 +25,6 @@ pub enum Error {
     Scan(ScanError),
     /// The declaration cannot be activated.
     Activate(ActivateError),
-    /// A SubDevice could not be brought to a state before activation.
-    Configure(ConfigureError),
-    /// An SDO transfer failed.
-    Sdo(SdoError),
     /// A service besides the mailbox protocols failed.
     Service(ServiceError),
     /// A service of one SubDevice failed.
@@ -84,8 +78,6 @@ impl fmt::Display for Error {
         match self {
             Error::Scan(error) => write!(f, "scan: {error}"),
             Error::Activate(error) => write!(f, "activation: {error}"),
-            Error::Configure(error) => error.fmt(f),
-            Error::Sdo(error) => error.fmt(f),
             Error::Service(error) => error.fmt(f),
             Error::SubDevice(error) => error.fmt(f),
             Error::States(error) => error.fmt(f),
@@ -121,8 +113,6 @@ impl std::error::Error for Error {
         match self {
             Error::Scan(error) => Some(error),
             Error::Activate(error) => Some(error),
-            Error::Configure(error) => Some(error),
-            Error::Sdo(error) => Some(error),
             Error::Service(error) => Some(error),
             Error::SubDevice(error) => Some(&**error),
             Error::States(error) => Some(error),
@@ -159,8 +149,6 @@ macro_rules! errors {
 errors! {
     Scan(ScanError),
     Activate(ActivateError),
-    Configure(ConfigureError),
-    Sdo(SdoError),
     Service(ServiceError),
     States(StatesError),
     NotReady(NotReady),

@@ -32,16 +32,16 @@ const COMMANDS: u8 = 1;
 /// A frame of another MainDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub struct Heard {
+pub struct ForeignFrame {
     /// The link that it arrived on.
     pub arrived_on: Link,
     /// Its source address.
     pub source: MacAddress,
 }
 
-impl fmt::Display for Heard {
+impl fmt::Display for ForeignFrame {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Heard { arrived_on, source } = self;
+        let ForeignFrame { arrived_on, source } = self;
         let source = address(*source);
         write!(f, "another MainDevice controls this segment: its frames, from {source}, arrive on {arrived_on}")
     }

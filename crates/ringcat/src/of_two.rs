@@ -27,7 +27,7 @@ pub(crate) struct OfTwo {
     /// When it became INACTIVE last.
     pub inactive_since: Instant,
     /// When a frame with process data of the other one came last.
-    pub heard_at: Option<Instant>,
+    pub partner_data_at: Option<Instant>,
     /// What decides about the role; `None`: the application does.
     pub watch: Option<Watch>,
 }
@@ -47,7 +47,7 @@ impl OfTwo {
         let is_active = role == MainDeviceRole::Active;
         if self.was_active && !is_active {
             forwarder.note_sent(now);
-            (self.inactive_since, self.heard_at) = (now, None);
+            (self.inactive_since, self.partner_data_at) = (now, None);
         }
         self.was_active = is_active;
         !is_active

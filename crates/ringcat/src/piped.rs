@@ -44,11 +44,6 @@ impl PipedLinks {
     pub fn adopt_acyclic(main: OwnedFd, redundant: Option<OwnedFd>) -> Result<PipedLinks, LinkError> {
         Ok(PipedLinks { wake_up: Some(WakeUp::new()?), ..PipedLinks::adopt(main, redundant)? })
     }
-
-    /// Whether the segment is gone, or another process has these links now.
-    pub fn are_ended(&self) -> bool {
-        self.main.is_ended() && self.redundant.as_ref().is_none_or(FramePipe::is_ended)
-    }
 }
 
 impl Links for PipedLinks {

@@ -31,7 +31,7 @@ pub use ringcat_engine::event::StandbyEvent;
 pub use ringcat_engine::layout::MasterSizes;
 use ringcat_engine::link::Link;
 pub use ringcat_engine::main_device::{
-    Active, Heard, HeardDiagnosis, Listener, Options as EngineOptions, StandbyOptions,
+    Active, Listener, Options as EngineOptions, PartnerDiagnosis, PartnerStatus, StandbyOptions,
 };
 pub use ringcat_engine::role::{Partner, RoleCause, RoleControl, RoleRequest};
 pub use ringcat_engine::standby::{

@@ -9,7 +9,7 @@
 //! * [`master`]: a master with its links; [`driver`]: the process that drives it; [`driving`]: this daemon while it
 //!   does; [`others`]: another MainDevice that does;
 //! * [`ethernet`]: network interfaces of EoE, which outlast applications;
-//! * [`owner`]: questions to an application that drives a master; [`tenure`]: its time, and what ends it;
+//! * [`owner`]: queries to an application that drives a master; [`tenure`]: its time, and what ends it;
 //!   [`process_state`]: what the kernel shows of its process; [`owner_lock`]: what of it outlives the daemon;
 //! * [`listening`], [`session`], [`rights`]: clients, what they ask, what they may;
 //! * [`daemon`]: all of it; [`running`]: from its start to its end; [`service_manager`]: messages to that; [`log`]:

@@ -35,7 +35,7 @@ impl Others {
 
     /// Why the daemon sends nothing, although it has the links: another MainDevice drives the segment.
     pub fn cause(&self) -> Option<String> {
-        self.listened.heard().map(|heard| heard.to_string())
+        self.listened.foreign_frame().map(|frame| frame.to_string())
     }
 
     /// Waits until it is known whether another MainDevice drives the segment. Without a carrier there is nothing to

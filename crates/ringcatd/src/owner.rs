@@ -1,4 +1,4 @@
-//! An application that drives a master, on the side of the daemon: questions to it, and their answers.
+//! An application that drives a master, on the side of the daemon: queries to it, and their answers.
 //!
 //! What an owner has not answered yet is bounded in number and in bytes, so a message to it always finds room in the
 //! socket, and an owner that is stopped costs each client one second at most. Further questions wait for a place.

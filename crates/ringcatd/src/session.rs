@@ -1,4 +1,4 @@
-//! A client: its greeting, its questions, and its time as the owner of a master.
+//! A client: its greeting, its queries, and its time as the owner of a master.
 
 use std::io;
 use std::os::fd::OwnedFd;
@@ -103,7 +103,7 @@ fn converse(connection: &Arc<Connection>, process: ClientProcess, masters: &Mast
                 let owner = OwnerLink::new(master, owner, ethernet, connection.clone()).with_end(signs.end());
                 return own(masters, masters.find(master)?, owner, signs);
             }
-            _ => return Err(expected("a question, or a request for a master")),
+            _ => return Err(expected("a query, or a request for a master")),
         }
     }
 }

@@ -46,7 +46,7 @@ pub struct Pair {
     traffic: Traffic,
     log: Vec<(Instant, String)>,
     /// Ethernet frames per cycle of each program that is started.
-    says: usize,
+    frames_per_cycle: usize,
 }
 
 impl Pair {
@@ -70,12 +70,21 @@ impl Pair {
         let (outputs, states) = (Outputs::new(&network, CYCLE), States::new(&network));
         let hosts = TwoHosts::new(network);
         let boards = [Arc::default(), Arc::default()];
-        Pair { seed, hosts, boards, outputs, states, traffic: Traffic::new(CYCLE), log: Vec::new(), says: 0 }
+        Pair {
+            seed,
+            hosts,
+            boards,
+            outputs,
+            states,
+            traffic: Traffic::new(CYCLE),
+            log: Vec::new(),
+            frames_per_cycle: 0,
+        }
     }
 
-    /// Programs that are started from now on have Ethernet to the other one, and send so many frames in each cycle.
-    pub fn let_members_talk(&mut self, frames: usize) {
-        self.says = frames;
+    /// Programs that are started from now on have Ethernet to the other one, and send this number of frames in each cycle.
+    pub fn let_members_send_frames(&mut self, frames: usize) {
+        self.frames_per_cycle = frames;
     }
 
     /// Starts the program of an ACTIVE MainDevice on a host: it scans, activates, and runs cycles.
@@ -162,7 +171,7 @@ impl Pair {
     fn start(&mut self, host: Host, phase: Phase, program: fn(HostLinks, &Board)) {
         self.say(format!("{host:?} starts: {phase:?}"));
         let board = Arc::new(Board::new(phase));
-        board.ask_to_say(self.says);
+        board.set_frames_per_cycle(self.frames_per_cycle);
         self.boards[host as usize] = board.clone();
         let started = self.hosts.start(host, move |links| program(links, &board));
         started.unwrap_or_else(|error| panic!("a program cannot be started: {error}"));

@@ -6,7 +6,7 @@
 //! and whether an output goes back to an older value.
 
 mod controller;
-mod talk;
+mod ethernet_traffic;
 
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ use ringcat_sim::time::SimTime;
 use ringcat_wire::al::{AlState, AlStatus};
 
 pub use self::controller::{CYCLE, Controller, Declare, Settings};
-pub use self::talk::Talk;
+pub use self::ethernet_traffic::EthernetTraffic;
 
 /// Both, and the network.
 pub struct Two {

@@ -221,12 +221,12 @@ impl World {
             }
         }
         self.journal.watch(at, network);
-        let mut has_news = false;
+        let mut has_events = false;
         while let Some(event) = self.application.pop_event() {
-            has_news = true;
+            has_events = true;
             self.journal.event(event);
         }
-        if has_news {
+        if has_events {
             let devices = self.by_station(|device| device.controller.is_powered());
             self.truth.follow(self.application.directory(), &devices);
         }

@@ -142,11 +142,6 @@ impl SimFrame {
         self.datagrams.truncate(most);
     }
 
-    /// Whether a controller finds datagrams to process.
-    pub const fn is_ethercat(&self) -> bool {
-        matches!(self.kind, FrameKind::Datagrams)
-    }
-
     /// Time from the first bit of the preamble to the last bit of the FCS at 100 Mbit/s.
     pub const fn first_to_last_bit_ns(&self) -> u64 {
         (self.bytes.len() as u64 + PREAMBLE_AND_FCS) * BYTE_TIME_NS
@@ -259,7 +254,7 @@ mod tests {
     #[test]
     fn datagrams_are_found_once() {
         let frame = SimFrame::new(7, two_datagrams());
-        assert!(frame.is_ethercat() && !frame.malformed);
+        assert!(matches!(frame.kind, FrameKind::Datagrams) && !frame.malformed);
         let places = [DatagramPlace { header: 16, length: 2 }, DatagramPlace { header: 30, length: 5 }];
         assert_eq!(frame.datagrams, places);
         assert_eq!((places[1].data(), places[1].wkc(), places[1].end()), (40, 45, 47));

@@ -112,11 +112,6 @@ impl Command {
         }
     }
 
-    /// Whether a processing unit increments the ADP of this command.
-    pub const fn counts_adp(self) -> bool {
-        matches!(self.addressing(), Addressing::AutoIncrement | Addressing::Broadcast)
-    }
-
     /// Whether SubDevices write data into the datagram (read access).
     pub const fn reads(self) -> bool {
         matches!(

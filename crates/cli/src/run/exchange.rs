@@ -39,7 +39,7 @@ pub struct Run {
 
 impl Run {
     /// Prints what has happened since the last call.
-    fn report_news(&mut self) {
+    fn report_events(&mut self) {
         self.log.report(&self.cycles, now(), |shown| {
             self.live.clear();
             print(shown);
@@ -78,12 +78,12 @@ impl Run {
                 return Err("the cycles ended before all SubDevices were in OP".to_owned());
             }
             if !in_op && now() >= until {
-                self.report_news();
+                self.report_events();
                 self.live.clear();
                 self.print_states(limit);
                 return Err(self.what_is_missing(limit));
             }
-            self.report_news();
+            self.report_events();
             if !in_op && self.cycles.supervisor().all_settled() && self.clocks_locked() {
                 (in_op, complete_until) = (true, now() + COMPLETE_LIMIT);
             }
@@ -91,7 +91,7 @@ impl Run {
             sleep(CHECK_PAUSE);
         }
         let reached = now();
-        self.report_news();
+        self.report_events();
         self.live.clear();
         print(self.log.words(reached, "all SubDevices are in OP"));
         for words in self.incomplete() {
@@ -156,11 +156,11 @@ impl Run {
     pub fn exchange(&mut self, until: Instant, end: &EndRequest) {
         end.limit(until);
         while now() < until && !end.is_asked() && !self.cycles.has_ended() {
-            self.report_news();
+            self.report_events();
             self.live.show(now(), self.cycles.cyclic_status(), self.cycles.supervisor(), self.log.events().names());
             sleep(CHECK_PAUSE.min(until.since(now())));
         }
-        self.report_news();
+        self.report_events();
         self.live.clear();
     }
 }

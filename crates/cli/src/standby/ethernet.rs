@@ -5,7 +5,7 @@ use ringcat::standby::{PartnerInterface, PartnerTraffic};
 use ringcat::wire::frame::MacAddress;
 use ringcat::{Instant, SupervisorThread};
 
-use super::news::News;
+use super::event_report::EventReport;
 use crate::failure::Failure;
 use crate::numbers::number;
 use crate::output::say;
@@ -51,10 +51,10 @@ pub struct Ethernet {
 
 impl Ethernet {
     /// Prints what has changed.
-    pub fn report(&mut self, news: &News, now: Instant) {
+    pub fn report(&mut self, events: &EventReport, now: Instant) {
         let (name, status) = (&self.name, self.interface.status());
         if std::mem::replace(&mut self.is_up, status.is_up) != status.is_up {
-            news.say(
+            events.say(
                 now,
                 &match status.is_up {
                     true => format!("{name}: frames can pass"),
@@ -63,7 +63,7 @@ impl Ethernet {
             );
         }
         if std::mem::replace(&mut self.is_removed, status.is_removed) != status.is_removed {
-            news.say(now, &format!("{name}: removed by another program"));
+            events.say(now, &format!("{name}: removed by another program"));
         }
     }
 

@@ -18,9 +18,9 @@ use ringcat_link::interface;
 use super::beating::{BeatingLinks, Beats, Half, HalfLinks};
 use super::counters::{in_line, same_identity};
 use super::ethernet::Ethernet;
+use super::event_report::EventReport;
 use super::guarding::Guarded;
 use super::joining::{Joined, Joiner};
-use super::news::News;
 use super::options::StandbyArguments;
 use crate::ending::EndRequest;
 use crate::failure::Failure;
@@ -55,7 +55,7 @@ struct Controller<'a> {
     beats: Arc<Beats>,
     guarded: Guarded,
     interfaces: [String; 2],
-    news: News,
+    events: EventReport,
     /// The interface that leads to the other MainDevice.
     ethernet: Option<Ethernet>,
 }
@@ -95,9 +95,9 @@ pub fn run(arguments: &StandbyArguments) -> Result<Report, Failure> {
     let interfaces = [names.main.clone(), redundant.to_owned()];
     let begin = now();
     let until = arguments.lasts.map_or(Instant::NEVER, |lasts| begin + lasts);
-    let news = News::new(begin);
+    let events = EventReport::new(begin);
     let controller =
-        Controller { arguments, end, until, supervisor, control, beats, guarded, interfaces, news, ethernet };
+        Controller { arguments, end, until, supervisor, control, beats, guarded, interfaces, events, ethernet };
     controller.run(network.map(Arc::new), cyclic)
 }
 
@@ -113,7 +113,7 @@ impl Controller<'_> {
             thread: arguments.thread,
             partner_ready: Arc::new(AtomicBool::new(false)),
             beats: self.beats.clone(),
-            names: self.news.names.clone(),
+            names: self.events.names.clone(),
         };
         let ready = joiner.partner_ready.clone();
         let _on = SwitchedOn::new(&self.interfaces)?;
@@ -129,8 +129,8 @@ impl Controller<'_> {
             let reason = unguarded.unwrap_or_else(|| format!("no ACTIVE was followed: {}", self.cause()));
             return Ok(self.report(vec![reason], &Standby::default(), "inactive"));
         };
-        self.news.seen.has_joined = true;
-        self.news.say(now(), &format!("{}: cycles run", self.control.role()));
+        self.events.seen.has_joined = true;
+        self.events.say(now(), &format!("{}: cycles run", self.control.role()));
         self.watch(&mut joined);
         self.finish(joined.cycles, &ready)
     }
@@ -143,10 +143,10 @@ impl Controller<'_> {
     }
 
     /// Prints what has happened.
-    fn show_news(&mut self) {
-        self.news.report(&self.supervisor, now());
+    fn report_events(&mut self) {
+        self.events.report(&self.supervisor, now());
         if let Some(ethernet) = &mut self.ethernet {
-            ethernet.report(&self.news, now());
+            ethernet.report(&self.events, now());
         }
     }
 
@@ -159,7 +159,7 @@ impl Controller<'_> {
     fn await_joined(&mut self, joining: JoinHandle<Result<Joined, Failure>>) -> Result<Option<Joined>, Failure> {
         let mut limit = None;
         while !joining.is_finished() {
-            self.show_news();
+            self.report_events();
             if self.is_over() {
                 let is_late = now() >= *limit.get_or_insert_with(|| now() + BRING_UP_LIMIT);
                 if is_late
@@ -181,12 +181,12 @@ impl Controller<'_> {
     fn watch(&mut self, joined: &mut Joined) {
         let mut in_op = false;
         while !self.is_over() && !joined.cycles.has_ended() {
-            self.show_news();
-            joined.watched.changes(now()).iter().for_each(|line| self.news.say(now(), line));
+            self.report_events();
+            joined.watched.changes(now()).iter().for_each(|line| self.events.say(now(), line));
             let settled = self.supervisor.all_settled();
             if settled && !in_op {
                 let role = self.control.role();
-                self.news.say(now(), &format!("{role}: all SubDevices are in OP"));
+                self.events.say(now(), &format!("{role}: all SubDevices are in OP"));
             }
             in_op = settled;
             sleep(LOOK);
@@ -198,30 +198,30 @@ impl Controller<'_> {
         if self.control.role() != MainDeviceRole::Active || !ready.load(Ordering::Relaxed) {
             return None;
         }
-        self.news.refused = None;
+        self.events.refused = None;
         self.control.request(RoleRequest::HandOver);
         let limit = now() + HAND_OVER_LIMIT;
-        while self.control.role() == MainDeviceRole::Active && self.news.refused.is_none() && now() < limit {
-            self.news.report(&self.supervisor, now());
+        while self.control.role() == MainDeviceRole::Active && self.events.refused.is_none() && now() < limit {
+            self.events.report(&self.supervisor, now());
             sleep(LOOK);
         }
-        self.news.seen.handed_over = self.control.role() != MainDeviceRole::Active;
-        if self.news.seen.handed_over {
+        self.events.seen.handed_over = self.control.role() != MainDeviceRole::Active;
+        if self.events.seen.handed_over {
             // Frames of the new ACTIVE arrive before this one leaves.
             sleep(LAST_NEWS);
-            self.news.report(&self.supervisor, now());
+            self.events.report(&self.supervisor, now());
             return None;
         }
-        let refused = self.news.refused.take();
+        let refused = self.events.refused.take();
         Some(refused.unwrap_or_else(|| "the other MainDevice did not take the role".to_owned()))
     }
 
     /// Ends the cycles in order.
     fn finish(mut self, cycles: CyclicThread<HalfLinks>, ready: &AtomicBool) -> Result<Report, Failure> {
-        self.news.report(&self.supervisor, now());
+        self.events.report(&self.supervisor, now());
         let mut reasons: Vec<String> = self.end.cut_short(self.arguments.lasts).into_iter().collect();
         let role = self.control.role();
-        self.news.seen.partner_ready = role == MainDeviceRole::Active && ready.load(Ordering::Relaxed);
+        self.events.seen.partner_ready = role == MainDeviceRole::Active && ready.load(Ordering::Relaxed);
         let has_acted = self.beats.has_acted.load(Ordering::Relaxed);
         if role == MainDeviceRole::Active {
             reasons.extend(self.not_in_op());
@@ -243,15 +243,15 @@ impl Controller<'_> {
         if is_active && !has_acted {
             match application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT) {
                 Ok(_) => {
-                    self.news.seen.stopped = true;
+                    self.events.seen.stopped = true;
                     say!("stopped: outputs zero, all SubDevices in INIT");
                 }
                 Err(error) => reasons.push(error.to_string()),
             }
         }
-        self.news.report(&self.supervisor, now());
+        self.events.report(&self.supervisor, now());
         reasons.extend(self.switch_off()?);
-        reasons.extend(self.news.reasons());
+        reasons.extend(self.events.reasons());
         reasons.extend(same_identity(&counters));
         say!("{}", in_line(&counters));
         self.ethernet.iter().for_each(Ethernet::summary);
@@ -279,8 +279,8 @@ impl Controller<'_> {
     }
 
     fn report(mut self, reasons: Vec<String>, standby: &Standby, role: &'static str) -> Report {
-        self.news.seen.role = role;
-        let seen = self.news.seen;
+        self.events.seen.role = role;
+        let seen = self.events.seen;
         let end = match (role, seen.handed_over) {
             ("active", true) => "handed the role over",
             ("active", false) => "stopped the bus as ACTIVE",

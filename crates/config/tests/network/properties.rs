@@ -81,7 +81,7 @@ fn mailboxes_in_boot_and_protocols_are_compared() {
     let text = "expected the protocols FoE, got SoE";
     assert_eq!(with(MailboxProtocols::COE | MailboxProtocols::SOE), one(Protocols, text));
     let coe = |bits: u8| differences(|info| info.coe = CoeDetails(bits));
-    assert_eq!(coe(0), [], "without details the EEPROM says nothing of them");
+    assert_eq!(coe(0), [], "without details the EEPROM states nothing of them");
     let text = "its CoE lacks a PDO assignment that can be written; it has complete access, in the file it has not";
     assert_eq!(coe(CoeDetails::SDO | CoeDetails::COMPLETE_ACCESS), one(Protocols, text));
     let text = "its CoE has PDO mappings that can be written, in the file it has not";
@@ -94,6 +94,6 @@ fn mailboxes_in_boot_and_protocols_are_compared() {
 fn ports_are_compared_by_place_and_kind() {
     let text = "expected ports \"KK\", got \"K Y\"";
     assert_eq!(differences(|info| info.physical_ports = 0x0103), one(Ports, text));
-    // Neither the EEPROM nor the controller says anything.
+    // Neither the EEPROM nor the controller states anything.
     assert_eq!(differences(|info| info.physical_ports = 0), []);
 }

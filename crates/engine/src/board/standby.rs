@@ -35,7 +35,7 @@ pub struct StandbyWords {
     /// Knowledge of this MainDevice, for the other one. Writer: the acyclic half.
     pub knowledge: Sheet,
     /// Knowledge of the other MainDevice. Writer: the cyclic half.
-    pub heard: Sheet,
+    pub partner_knowledge: Sheet,
     /// Diagnosis of the other MainDevice. Writer: the cyclic half.
     pub diagnosis: Sheet,
     /// Session of the other MainDevice, plus one; 0 before its first header.
@@ -45,7 +45,7 @@ pub struct StandbyWords {
     /// The last [`Takeover`], as a number. Writer: the cyclic half.
     takeover: AtomicU8,
     /// When a frame of the other MainDevice came last while this one is INACTIVE; 0 before. Writers: both halves.
-    heard_at: AtomicU64,
+    partner_frame_at: AtomicU64,
     /// Its version and the oldest one that could read it, if this MainDevice cannot; 0 otherwise.
     other_version: AtomicU32,
     /// Source address and link of an acyclic frame of another MainDevice that came while this one was ACTIVE; 0 without
@@ -63,12 +63,12 @@ impl Default for StandbyWords {
     fn default() -> StandbyWords {
         StandbyWords {
             knowledge: Sheet::new(KNOWLEDGE_ROOM),
-            heard: Sheet::new(KNOWLEDGE_ROOM),
+            partner_knowledge: Sheet::new(KNOWLEDGE_ROOM),
             diagnosis: Sheet::new(Diagnosis::LEN + DOMAINS * DomainRecord::LEN),
             session: AtomicU32::new(0),
             identity: AtomicU64::new(0),
             takeover: AtomicU8::new(0),
-            heard_at: AtomicU64::new(0),
+            partner_frame_at: AtomicU64::new(0),
             other_version: AtomicU32::new(0),
             collision: AtomicU64::new(0),
             write: AtomicU16::new(0),
@@ -98,13 +98,13 @@ impl StandbyWords {
     }
 
     /// Posts that a frame of the other MainDevice has come.
-    pub fn post_heard(&self, now: Instant) {
-        self.heard_at.fetch_max(now.0.max(1), Ordering::Relaxed);
+    pub fn post_partner_frame(&self, now: Instant) {
+        self.partner_frame_at.fetch_max(now.0.max(1), Ordering::Relaxed);
     }
 
     /// When a frame of the other MainDevice came last.
-    pub fn heard_at(&self) -> Option<Instant> {
-        let at = self.heard_at.load(Ordering::Relaxed);
+    pub fn partner_frame_at(&self) -> Option<Instant> {
+        let at = self.partner_frame_at.load(Ordering::Relaxed);
         (at != 0).then_some(Instant(at))
     }
 

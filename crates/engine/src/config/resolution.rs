@@ -52,16 +52,16 @@ impl fmt::Display for ConfigError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             ConfigError::Mismatch { position, field, expected, got } => {
-                write!(f, "SubDevice {position}: expected {field} {expected:#010x}, got {got:#010x}")
+                write!(f, "position {position}: expected {field} {expected:#010x}, got {got:#010x}")
             }
             ConfigError::Missing { address, present } => {
                 write!(f, "no SubDevice at {address}; {present} are present")
             }
             ConfigError::Ambiguous { address, first, second } => {
-                write!(f, "{} belongs to SubDevice {first} and to SubDevice {second}", address.mark())
+                write!(f, "{} belongs to position {first} and to position {second}", address.mark())
             }
             ConfigError::DeclaredTwice { position, first } => {
-                write!(f, "SubDevice {position} is declared by declaration {first} already")
+                write!(f, "position {position} is declared as SubDevice {first} already")
             }
         }
     }

@@ -33,7 +33,7 @@ pub struct DuplicateAlias {
 
 impl fmt::Display for DuplicateAlias {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "SubDevice {} and SubDevice {} have the same alias {}", self.first, self.second, self.alias)
+        write!(f, "positions {} and {} have the same alias {}", self.first, self.second, self.alias)
     }
 }
 

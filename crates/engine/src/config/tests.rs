@@ -47,7 +47,7 @@ fn a_wrong_product_is_an_error_with_position_expected_and_got() {
     let [Resolution::Failed { config: 0, error }, Resolution::Extra { info: 0 }] = resolutions[..] else {
         panic!("{resolutions:?}")
     };
-    assert_eq!(error.to_string(), "SubDevice 0: expected product code 0x0000000a, got 0x0000000b");
+    assert_eq!(error.to_string(), "position 0: expected product code 0x0000000a, got 0x0000000b");
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn two_subdevices_with_the_same_alias_are_an_ambiguous_address() {
     assert_eq!(resolve(&[SubDeviceConfig::at_alias(7, 1)], &infos)[0], failed);
     let duplicate = DuplicateAlias { alias: 7, first: Position(0), second: Position(2) };
     assert_eq!(duplicate_aliases(&infos), [duplicate]);
-    assert_eq!(duplicate.to_string(), "SubDevice 0 and SubDevice 2 have the same alias 7");
+    assert_eq!(duplicate.to_string(), "positions 0 and 2 have the same alias 7");
 }
 
 #[test]
@@ -169,7 +169,7 @@ fn a_lowest_revision_and_an_identification_are_compared_if_declared() {
     let Resolution::Failed { error, .. } = resolve(&[config(0, 10).expect_revision_from(4)], &infos)[0] else {
         panic!()
     };
-    assert_eq!(error.to_string(), "SubDevice 0: expected a revision not below 0x00000004, got 0x00000003");
+    assert_eq!(error.to_string(), "position 0: expected a revision not below 0x00000004, got 0x00000003");
     let identified = config(0, 10).expect_identification(7);
     let error =
         ConfigError::Mismatch { position: Position(0), field: IdentityField::Identification, expected: 7, got: 0 };
@@ -189,7 +189,7 @@ fn an_identification_finds_its_bearer_wherever_it_is() {
     let address = ConfigAddress::Identification { value: 5, offset: 0 };
     let error = ConfigError::Ambiguous { address, first: Position(0), second: Position(2) };
     assert_eq!(resolve(&configs, &infos)[0], Resolution::Failed { config: 0, error });
-    assert_eq!(error.to_string(), "identification 5 belongs to SubDevice 0 and to SubDevice 2");
+    assert_eq!(error.to_string(), "identification 5 belongs to position 0 and to position 2");
 }
 
 /// A group of two behind an alias, and two others.

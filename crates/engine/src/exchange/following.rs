@@ -20,7 +20,7 @@ use ringcat_wire::master_frame::{
 
 pub(crate) use self::content::Content;
 use self::cycle::Cycle;
-use self::knowledge::HeardKnowledge;
+use self::knowledge::ReceivedKnowledge;
 pub(crate) use self::outputs::OutputsSeen;
 use crate::board::standby::StandbyWords;
 use crate::link::Link;
@@ -55,7 +55,7 @@ pub(crate) enum Unusable {
 pub(crate) struct Following {
     lengths: Lengths,
     words: Arc<StandbyWords>,
-    knowledge: HeardKnowledge,
+    knowledge: ReceivedKnowledge,
     /// By the lowest bit of the cycle.
     cycles: [Cycle; 2],
     whole: Whole,
@@ -82,7 +82,7 @@ impl Following {
             cycles: [cycle(), cycle()],
             whole: Whole { cycle: 0, header: Header::default(), content: Content::new(&lengths), at: Instant::NEVER },
             has_whole: false,
-            knowledge: HeardKnowledge::default(),
+            knowledge: ReceivedKnowledge::default(),
             to_active: vec![0; lengths.to_active as usize].into_boxed_slice(),
             sender: None,
             newest: None,
@@ -191,7 +191,7 @@ impl Following {
             // Without its header it may be a piece of other knowledge.
             Area::Knowledge if cycle.header.is_none() => false,
             Area::Knowledge => {
-                self.knowledge.take(&self.words.heard, head.offset as usize, fragment.data);
+                self.knowledge.take(&self.words.partner_knowledge, head.offset as usize, fragment.data);
                 true
             }
             area => cycle.content.take(area, head.offset, fragment.data, is_first),

@@ -99,7 +99,7 @@ impl Exchange {
         self.standby.0.as_ref()?.words.write()
     }
 
-    /// The same of the other ACTIVE in a collision, as its last master frame says.
+    /// The same of the other ACTIVE in a collision, according to its last master frame.
     pub fn memory_write_of_collided(&self) -> Option<MemoryWrite> {
         self.standby.0.as_ref()?.collided_write
     }

@@ -166,21 +166,21 @@ impl fmt::Display for ActivateError {
         match self {
             ActivateError::NoScan => f.write_str("no scan result: scan before activating"),
             ActivateError::NotPermitted(denied) => denied.fmt(f),
-            ActivateError::Config { subdevice, error } => write!(f, "declaration {subdevice}: {error}"),
-            ActivateError::Setup { subdevice, error } => write!(f, "declaration {subdevice}: {error}"),
+            ActivateError::Config { subdevice, error } => write!(f, "SubDevice {subdevice}: {error}"),
+            ActivateError::Setup { subdevice, error } => write!(f, "SubDevice {subdevice}: {error}"),
             ActivateError::Scanning => f.write_str("a scan is running"),
             ActivateError::NotLoaded => f.write_str("nothing is loaded: load a declaration before applying it"),
             ActivateError::Junction(error) => error.fmt(f),
             ActivateError::Target { subdevice, target } => {
-                write!(f, "declaration {subdevice}: expected target INIT, PREOP, SAFEOP or OP, got {target}")
+                write!(f, "SubDevice {subdevice}: expected target INIT, PREOP, SAFEOP or OP, got {target}")
             }
             ActivateError::Headless { subdevice } => write!(
                 f,
-                "declaration {subdevice}: the head of a group is found by alias or identification, got another address"
+                "SubDevice {subdevice}: the head of a group is found by alias or identification, got another address"
             ),
             ActivateError::TwoDomains { subdevice, sync_manager, domains: [a, b] } => write!(
                 f,
-                "declaration {subdevice}: process data of SyncManager {sync_manager} is in domain {a} and in domain {b}"
+                "SubDevice {subdevice}: process data of SyncManager {sync_manager} is in domain {a} and in domain {b}"
             ),
             ActivateError::MixedPlaces { domain } => {
                 write!(f, "domain {domain} has members and registered areas: register all of its process data, or none")
@@ -189,7 +189,7 @@ impl fmt::Display for ActivateError {
             ActivateError::Registered { .. } => self.fmt_registered(f),
             ActivateError::NoDomain { subdevice } => write!(
                 f,
-                "declaration {subdevice} has process data and there is no domain to exchange it: declare a domain, or \
+                "SubDevice {subdevice} has process data and there is no domain to exchange it: declare a domain, or \
                  PREOP as the target"
             ),
             ActivateError::SyncCycle { subdevice, sync0, period } => fmt_sync_cycle(f, *subdevice, *sync0, *period),
@@ -202,17 +202,17 @@ impl fmt::Display for ActivateError {
                 f.write_str("LRW is not allowed with MainDevice redundancy: declare LRD and LWR")
             }
             ActivateError::LrwUnknown { domain, subdevice } => {
-                write!(f, "domain {domain}: LRW is configured, but declaration {subdevice} does not support it")
+                write!(f, "domain {domain}: LRW is configured, but SubDevice {subdevice} does not support it")
             }
             ActivateError::Layout(error) => error.fmt(f),
             ActivateError::NoClock { subdevice, has_clock: false } => {
-                write!(f, "declaration {subdevice}: SYNC signals for a SubDevice without a distributed clock")
+                write!(f, "SubDevice {subdevice}: SYNC signals, but it has no distributed clock")
             }
             ActivateError::NoClock { subdevice, has_clock: true } => {
-                write!(f, "declaration {subdevice}: SYNC signals, but no distributed clocks are declared")
+                write!(f, "SubDevice {subdevice}: SYNC signals, but no distributed clocks are declared")
             }
             ActivateError::UnknownMember { domain, subdevice } => {
-                write!(f, "domain {domain} names declaration {subdevice}, which does not exist")
+                write!(f, "domain {domain} names SubDevice {subdevice}, which is not declared")
             }
         }
     }
@@ -238,13 +238,13 @@ impl ActivateError {
         match self {
             ActivateError::LrwOnTwoLinks { domain, logical, length, subdevices } => write!(
                 f,
-                "domain {domain}: an LRW at logical address {logical} of {length} bytes for declarations \
+                "domain {domain}: an LRW at logical address {logical} of {length} bytes for SubDevices \
                  {:?} cannot be used with two links: leave it to the MainDevice, or use one LRW per SubDevice",
                 list(subdevices)
             ),
             ActivateError::NamedLrwOnTwoLinks(ExplicitLrw { name, logical, length, subdevices }) => write!(
                 f,
-                "{name}: an LRW at logical address {logical} of {length} bytes for declarations {:?} cannot \
+                "{name}: an LRW at logical address {logical} of {length} bytes for SubDevices {:?} cannot \
                  be used with two links: let it be split into LRD and LWR, or use one LRW per SubDevice",
                 list(subdevices)
             ),
@@ -259,7 +259,7 @@ impl ActivateError {
         };
         write!(
             f,
-            "declaration {subdevice}: SyncManager {sync_manager} was registered in domain {domain} with {bytes} bytes \
+            "SubDevice {subdevice}: SyncManager {sync_manager} was registered in domain {domain} with {bytes} bytes \
              of {direction}, "
         )?;
         match got {
@@ -290,7 +290,7 @@ fn fmt_sync_cycle(
     period: Duration,
 ) -> fmt::Result {
     let [sync0, period] = [sync0, period].map(in_us);
-    write!(f, "declaration {subdevice}: SYNC0 every {sync0} us does not go with cycles of {period} us: ")?;
+    write!(f, "SubDevice {subdevice}: SYNC0 every {sync0} us does not go with cycles of {period} us: ")?;
     f.write_str("one must be a multiple of the other")
 }
 

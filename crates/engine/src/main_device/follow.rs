@@ -20,9 +20,9 @@ use crate::segment::{Found, Observation, Scan};
 
 impl MainDevice {
     /// Prepares an application that follows the ACTIVE, in role INACTIVE: its process data has the places that it has
-    /// there. `knowledge` and `session` are those of the ACTIVE ([`MainDevice::heard_knowledge`],
-    /// [`MainDevice::heard_configuration`]). No frame is sent; when the role becomes ACTIVE, the exchange goes on with
-    /// the next cycle, and the SubDevices stay as they are.
+    /// there. `knowledge` and `session` are those of the ACTIVE ([`MainDevice::partner_knowledge`],
+    /// [`MainDevice::partner_configuration`]). No frame is sent; when the role becomes ACTIVE, the exchange goes on
+    /// with the next cycle, and the SubDevices stay as they are.
     ///
     /// # Errors
     /// This MainDevice is ACTIVE, has an application, or the declaration does not fit what is known of the segment.
@@ -57,8 +57,8 @@ impl MainDevice {
     }
 
     /// The SubDevices in the knowledge of the ACTIVE, to declare them; `None` before all of it has arrived.
-    pub fn heard_scan(&self) -> Option<Scan> {
-        self.heard_knowledge().map(|knowledge| scan_of(&knowledge))
+    pub fn partner_scan(&self) -> Option<Scan> {
+        self.partner_knowledge().map(|knowledge| scan_of(&knowledge))
     }
 
     /// From now on the model shows the states reported by the ACTIVE.

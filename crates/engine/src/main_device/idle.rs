@@ -42,6 +42,13 @@ impl MainDevice {
         self.active().is_none() && self.segment.view().are_pdos_awaited()
     }
 
+    /// Whether ports are closed for a moment, to measure delays. They are opened again by this MainDevice; without a
+    /// further frame of it they are opened when the temporary setting expires, within a second.
+    pub fn are_ports_altered(&self) -> bool {
+        let view = self.segment.view();
+        view.is_measuring() || !view.altered().is_empty()
+    }
+
     /// The SubDevice with an address.
     pub(super) fn find(&self, subdevice: impl Into<Address>) -> Result<Addressed, ServiceError> {
         let subdevice = subdevice.into();

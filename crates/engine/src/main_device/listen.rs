@@ -4,7 +4,7 @@
 use ringcat_wire::master_frame::{Diagnosis, DomainRecord};
 
 use super::MainDevice;
-use super::listener::{Heard, HeardDiagnosis, Listener, known};
+use super::listener::{Listener, PartnerDiagnosis, PartnerStatus, known};
 use crate::event::{Event, StandbyEvent};
 use crate::knowledge::Knowledge;
 use crate::link::Link;
@@ -33,7 +33,7 @@ impl MainDevice {
         let Some(standby) = &mut self.standby else { return };
         match &mut standby.listener {
             Some(listener) if !has_application => listener.fill(arrived_on, frame, now),
-            _ => standby.words.post_heard(now),
+            _ => standby.words.post_partner_frame(now),
         }
         self.report_version(now);
     }
@@ -50,28 +50,28 @@ impl MainDevice {
     }
 
     /// What has arrived from the ACTIVE while there is no application.
-    pub fn heard(&self) -> Heard {
-        let Some(standby) = &self.standby else { return Heard::default() };
-        let at = standby.words.heard_at();
-        standby.listener.as_ref().map_or(Heard { at, ..Heard::default() }, Listener::heard)
+    pub fn partner_status(&self) -> PartnerStatus {
+        let Some(standby) = &self.standby else { return PartnerStatus::default() };
+        let at = standby.words.partner_frame_at();
+        standby.listener.as_ref().map_or(PartnerStatus { at, ..PartnerStatus::default() }, Listener::partner_status)
     }
 
     /// Knowledge of the segment that the ACTIVE has sent, with which an application can follow it
     /// ([`MainDevice::follow`]); `None` before all of it has arrived.
-    pub fn heard_knowledge(&self) -> Option<Knowledge> {
-        known(&self.standby.as_ref()?.words.heard)
+    pub fn partner_knowledge(&self) -> Option<Knowledge> {
+        known(&self.standby.as_ref()?.words.partner_knowledge)
     }
 
     /// What the ACTIVE has measured of the segment: its counters, carriers and domains (protocol MR-14, MR-19), as of
     /// the last cycle that has arrived as a whole; `None` before one, and without the options of MainDevice redundancy.
-    /// [`HeardDiagnosis::at`] says how old it is: without an ACTIVE it remains.
-    pub fn heard_diagnosis(&self) -> Option<HeardDiagnosis> {
+    /// [`PartnerDiagnosis::at`] shows how old it is: without an ACTIVE it remains.
+    pub fn partner_diagnosis(&self) -> Option<PartnerDiagnosis> {
         let words = &self.standby.as_ref()?.words;
         let (_, bytes) = words.diagnosis.copy()?;
         let counters = Diagnosis::decode(&bytes).ok()?;
         let domains = bytes.get(Diagnosis::LEN..)?.chunks_exact(DomainRecord::LEN);
         let domains = domains.filter_map(|record| DomainRecord::decode(record).ok()).collect();
-        Some(HeardDiagnosis { at: words.heard_at(), counters, domains })
+        Some(PartnerDiagnosis { at: words.partner_frame_at(), counters, domains })
     }
 
     /// What this MainDevice knew of the segment when it was ACTIVE last.

@@ -19,7 +19,7 @@ use crate::time::Instant;
 /// What an INACTIVE MainDevice has received from the ACTIVE.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
-pub struct Heard {
+pub struct PartnerStatus {
     /// When a frame of another MainDevice came last.
     pub at: Option<Instant>,
     /// Period of its cycles; `None` before a master frame.
@@ -31,7 +31,7 @@ pub struct Heard {
 /// What the ACTIVE has reported of the segment and of its frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub struct HeardDiagnosis {
+pub struct PartnerDiagnosis {
     /// When a frame of another MainDevice came last.
     pub at: Option<Instant>,
     /// State of the ring, carriers, SubDevices that answer, and the counters of its frames and cycles.
@@ -57,7 +57,7 @@ impl Listener {
     /// Takes and fills a received frame of another MainDevice before it is forwarded. Any bytes are allowed. Neither
     /// allocates nor waits.
     pub fn fill(&mut self, arrived_on: Link, frame: &mut [u8], now: Instant) {
-        self.words.post_heard(now);
+        self.words.post_partner_frame(now);
         self.listening.fill(arrived_on, frame, now);
         if let Some(Unusable::Version { least, got }) = self.listening.unusable {
             self.words.post_other_version(least, got);
@@ -65,13 +65,13 @@ impl Listener {
     }
 
     /// What has arrived so far.
-    pub fn heard(&self) -> Heard {
+    pub fn partner_status(&self) -> PartnerStatus {
         let newest = self.listening.newest().and_then(|(cycle, _)| self.listening.header_of(cycle));
         let period = |(Header { period_ns, .. }, _)| Duration::from_nanos(u64::from(period_ns));
-        Heard {
-            at: self.words.heard_at(),
+        PartnerStatus {
+            at: self.words.partner_frame_at(),
             period: newest.map(period).filter(|period| !period.is_zero()),
-            is_known: self.words.header().is_some() && known(&self.words.heard).is_some(),
+            is_known: self.words.header().is_some() && known(&self.words.partner_knowledge).is_some(),
         }
     }
 }

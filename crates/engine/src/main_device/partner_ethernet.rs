@@ -14,7 +14,7 @@ use crate::standby::ethernet::EthernetDue;
 use crate::time::Instant;
 
 impl MainDevice {
-    /// The end of the Ethernet to the other MainDevice, for any thread. `None` without
+    /// The endpoint of the Ethernet to the other MainDevice, for any thread. `None` without
     /// [`StandbyOptions::max_acyclic`](super::StandbyOptions::max_acyclic), and after the first call.
     pub fn partner_endpoint(&mut self) -> Option<PartnerEndpoint> {
         self.standby.as_mut()?.endpoint.take()

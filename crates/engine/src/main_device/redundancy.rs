@@ -34,7 +34,7 @@ impl MainDevice {
     }
 
     /// Session and digest of the configuration of the ACTIVE; `None` before a frame of it.
-    pub fn heard_configuration(&self) -> Option<(u16, u64)> {
+    pub fn partner_configuration(&self) -> Option<(u16, u64)> {
         self.standby.as_ref()?.words.header()
     }
 

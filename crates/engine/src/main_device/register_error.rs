@@ -81,30 +81,30 @@ impl fmt::Display for RegisterError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             RegisterError::NoSuchDomain { domain } => write!(f, "domain {domain} is not declared"),
-            RegisterError::NoSuchSubDevice { subdevice } => write!(f, "declaration {subdevice} does not exist"),
+            RegisterError::NoSuchSubDevice { subdevice } => write!(f, "SubDevice {subdevice} is not declared"),
             RegisterError::Packed { domain } => write!(
                 f,
                 "domain {domain} has members, which the MainDevice packs at activation: register in a domain without"
             ),
-            RegisterError::Plan { subdevice, error } => write!(f, "declaration {subdevice}: {error}"),
+            RegisterError::Plan { subdevice, error } => write!(f, "SubDevice {subdevice}: {error}"),
             RegisterError::Unknown { subdevice } => write!(
                 f,
-                "declaration {subdevice}: the scan has not found it, and its PDOs are not declared with their entries"
+                "SubDevice {subdevice}: the scan has not found it, and its PDOs are not declared with their entries"
             ),
             RegisterError::NotMapped { subdevice, index, sub_index } => write!(
                 f,
-                "declaration {subdevice}: no assigned PDO contains {index:#06x}:{sub_index:02x}; assign one that does"
+                "SubDevice {subdevice}: no assigned PDO contains {index:#06x}:{sub_index:02x}; assign one that does"
             ),
             RegisterError::NoProcessData { subdevice, sync_manager } => {
-                write!(f, "declaration {subdevice}: SyncManager {sync_manager} has no process data")
+                write!(f, "SubDevice {subdevice}: SyncManager {sync_manager} has no process data")
             }
             RegisterError::NoSuchPlace { subdevice, place: EntryPlace { sync_manager, pdo, entry } } => write!(
                 f,
-                "declaration {subdevice}: SyncManager {sync_manager} has no entry {entry} in PDO {pdo}, counted from 0"
+                "SubDevice {subdevice}: SyncManager {sync_manager} has no entry {entry} in PDO {pdo}, counted from 0"
             ),
             RegisterError::TooManyPlaces { subdevice, needed, available } => write!(
                 f,
-                "declaration {subdevice}: its process data would need {needed} FMMUs, it has {available}: register \
+                "SubDevice {subdevice}: its process data would need {needed} FMMUs, it has {available}: register \
                  it in fewer domains"
             ),
             RegisterError::TooLarge { domain } => write!(f, "domain {domain}: the image would exceed 2 GiB"),

@@ -42,7 +42,7 @@ pub(super) struct Standby {
     pub published: Option<Marks>,
     /// Ethernet between both MainDevices.
     pub ethernet: Option<PartnerEthernet>,
-    /// Its end for the application, until that takes it.
+    /// Its endpoint for the application, until that takes it.
     pub endpoint: Option<PartnerEndpoint>,
 }
 
@@ -93,7 +93,7 @@ impl Standby {
     /// Whether Ethernet frames for the other MainDevice wait since it was determined last what is due. Cheap.
     #[inline]
     pub fn has_frames(&self) -> bool {
-        self.ethernet.as_ref().is_some_and(PartnerEthernet::has_news)
+        self.ethernet.as_ref().is_some_and(PartnerEthernet::has_frames)
     }
 }
 

@@ -16,7 +16,7 @@ pub struct StandbyOptions {
     pub goes_through_init: bool,
     /// Most acyclic master frames per cycle, with Ethernet frames between both MainDevices
     /// ([`MainDevice::partner_endpoint`](super::MainDevice::partner_endpoint)); at most 16 (protocol AC-03). 0 by
-    /// default: no Ethernet. The ACTIVE sends as many as its own options say, and only if those of the other one are
+    /// default: no Ethernet. The ACTIVE sends as many as its own options allow, and only if those of the other one are
     /// not 0 it is answered.
     pub max_acyclic: u8,
 }

@@ -205,7 +205,7 @@ impl MainDevice {
     fn learn_clocks(&self, takeover: Takeover) {
         let knowledge = match takeover {
             Takeover::FromItself => self.published_knowledge(),
-            Takeover::FromOther | Takeover::ThroughInit => self.heard_knowledge(),
+            Takeover::FromOther | Takeover::ThroughInit => self.partner_knowledge(),
         };
         let known = knowledge.and_then(|knowledge| knowledge.clocks);
         if let Some(known) = known.filter(|_| self.segment.view().clocks().are_declared()) {

@@ -401,7 +401,7 @@ fn without_changes_the_model_sleeps_until_the_next_routine_scan() {
 }
 
 /// Evaluates the same words whenever the model requests it, for a second; returns how often. Rounds end at once.
-fn evaluations_without_news(ring: &mut Ring, high: &[u8]) -> usize {
+fn evaluations_without_changes(ring: &mut Ring, high: &[u8]) -> usize {
     let (words, end) = (ring.words.words(), ring.now + Duration::from_secs(1));
     let mut count = 0;
     loop {
@@ -425,7 +425,7 @@ fn the_model_is_not_evaluated_again_and_again_when_an_application_stops_cycling(
     ring.counts(3, 0, RingState::Closed);
     ring.words.ring.changes -= 1;
     ring.cycle();
-    let count = evaluations_without_news(&mut ring, &[PASS, PASS, PASS, 0]);
+    let count = evaluations_without_changes(&mut ring, &[PASS, PASS, PASS, 0]);
     assert!(count <= 5, "counts that never settle: {count} evaluations");
     // The ring was opened, and no result shows it.
     let mut ring = Ring::closed(4);
@@ -434,13 +434,13 @@ fn the_model_is_not_evaluated_again_and_again_when_an_application_stops_cycling(
     ring.words.ring.returned = None;
     ring.words.supervision.as_mut().unwrap().1.returned = false;
     ring.cycle();
-    let count = evaluations_without_news(&mut ring, &[PASS; 4]);
+    let count = evaluations_without_changes(&mut ring, &[PASS; 4]);
     assert!(count <= 5, "counts from before: {count} evaluations");
     // The ECAT event of a port was set, and stays.
     let mut ring = Ring::closed(4);
     ring.words.supervision.as_mut().unwrap().1.irq = 4;
     ring.cycle();
-    let count = evaluations_without_news(&mut ring, &[PASS; 4]);
+    let count = evaluations_without_changes(&mut ring, &[PASS; 4]);
     assert!(count <= 5, "an ECAT event: {count} evaluations");
 }
 
@@ -455,7 +455,7 @@ fn a_held_back_change_is_evaluated_when_it_may_be_reported_and_not_before() {
     ring.cycle();
     ring.scan(&[PASS; 4]);
     let since = ring.now;
-    let count = evaluations_without_news(&mut ring, &[PASS; 4]);
+    let count = evaluations_without_changes(&mut ring, &[PASS; 4]);
     assert!(count <= 6, "{count} evaluations");
     assert!(ring.now > since);
     assert!(reports(&ring.cycle()).is_empty(), "the carrier was reported when it was due");

@@ -20,13 +20,13 @@ use crate::standby::policy::{Policy, Situation, Watch};
 struct Following<'a, H> {
     exchange: &'a mut Exchange,
     acyclic: &'a mut H,
-    heard_at: &'a mut Option<Instant>,
+    partner_data_at: &'a mut Option<Instant>,
 }
 
 impl<H: AcyclicHalf> Reads for Following<'_, H> {
     fn before(&mut self, link: Link, frame: &mut [u8], at: Instant) {
         if class_of(frame) == Some(Class::Cyclic) {
-            *self.heard_at = Some(at);
+            *self.partner_data_at = Some(at);
             self.exchange.fill(link, frame, at);
         } else {
             self.acyclic.fill(link, frame, at);
@@ -61,7 +61,10 @@ impl Cyclic {
     pub fn pass_on(&mut self, links: &mut impl Links, acyclic: &mut impl AcyclicHalf) {
         let Cyclic { exchange, of_two, .. } = self;
         if let Some(forwarder) = &mut of_two.forwarder {
-            forwarder.forward_and_read(links, &mut Following { exchange, acyclic, heard_at: &mut of_two.heard_at });
+            forwarder.forward_and_read(
+                links,
+                &mut Following { exchange, acyclic, partner_data_at: &mut of_two.partner_data_at },
+            );
         }
         self.expect_other();
     }
@@ -103,13 +106,13 @@ impl Cyclic {
         let Some(watch) = &mut of_two.watch else { return };
         if Link::ALL.iter().all(|link| exchange.carrier(*link) == Some(false)) {
             // No frame can arrive: listening begins when a link is up again.
-            (of_two.inactive_since, of_two.heard_at) = (now, None);
+            (of_two.inactive_since, of_two.partner_data_at) = (now, None);
         }
         let situation = Situation {
             role: exchange.role(),
             inactive_since: of_two.inactive_since,
-            heard_at: of_two.heard_at,
-            heard_any_at: exchange.heard_any_at(),
+            partner_data_at: of_two.partner_data_at,
+            partner_frame_at: exchange.partner_frame_at(),
             collided_with: exchange.take_collision(),
             writes: exchange.memory_write().is_some(),
             other_writes: exchange.memory_write_of_collided().is_some(),

@@ -77,7 +77,7 @@ pub fn answer(supervisor: &SupervisorThread, ask: Query, bytes: Vec<u8>) -> Resu
         Query::IdnWrite { position, drive, idn } => {
             subdevice(position).soe_write(faults::drive(drive)?, Idn(idn), bytes).map(done)
         }
-        _ => return Err(expected("a question of this version")),
+        _ => return Err(expected("a query of this version")),
     };
     result.map_err(|error: Error| refusal(&error))
 }

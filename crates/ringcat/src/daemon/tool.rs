@@ -76,7 +76,7 @@ fn act(supervisor: &SupervisorThread, ask: ToolQuery, bytes: Vec<u8>) -> Answere
         ToolQuery::UrgentWrite { position, address } => return write_urgently(supervisor, position, address, bytes),
         ToolQuery::SetIp { position, ip } => return set_ip(supervisor, position, ip),
         ToolQuery::SetDebugLevel { level } => supervisor.set_log_filter(LogFilter::new(LogLevel::from_number(level))),
-        _ => return Err(expected("a question of this version")),
+        _ => return Err(expected("a query of this version")),
     };
     finished(done)
 }

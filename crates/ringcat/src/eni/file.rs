@@ -185,7 +185,7 @@ fn protocols(names: &[String]) -> MailboxProtocols {
     MailboxProtocols(names.iter().map(bit).fold(0, |all, bit| all | bit))
 }
 
-/// Mailboxes in BOOT. EC-Engineer repeats the others where the device has none of its own: they say nothing.
+/// Mailboxes in BOOT. EC-Engineer repeats the others where the device has none of its own: they state nothing.
 fn boot_mailbox(of: &Mailbox) -> Option<[(u16, u16); 2]> {
     let place = |buffer: &MailboxBuffer| (buffer.start, buffer.length);
     let boot = of.bootstrap.as_ref().map(|(write, read)| [place(write), place(read)])?;

@@ -99,6 +99,10 @@ fn converted(dictionary: &Dictionary, object: &EsiObject, room: &mut PartsRoom) 
     Ok(Object { index: object.index.index, name, role: ObjectRole::Plain, entries })
 }
 
+/// The rights beside reading and writing.
+const BESIDE_ACCESS: u16 =
+    AccessRights::RX_MAPPABLE | AccessRights::TX_MAPPABLE | AccessRights::BACKUP | AccessRights::SETTING;
+
 fn entry(part: &Part, is_single: bool) -> Entry {
     let rights = part.flags.access;
     let access = match (rights.read, rights.write) {
@@ -107,13 +111,7 @@ fn entry(part: &Part, is_single: bool) -> Entry {
         (_, 1) => Access::ReadWritePreOp,
         (_, _) => Access::ReadWrite,
     };
-    let more = [
-        (part.flags.rx_mappable, AccessRights::RX_MAPPABLE),
-        (part.flags.tx_mappable, AccessRights::TX_MAPPABLE),
-        (part.flags.is_backup, AccessRights::BACKUP),
-        (part.flags.is_setting, AccessRights::SETTING),
-    ];
-    let more = more.into_iter().filter(|(is_set, _)| *is_set).fold(0, |all, (_, bit)| all | bit);
+    let more = part.flags.access_word() & BESIDE_ACCESS;
     let code = u8::try_from(part.data_type).unwrap_or(data_type::OCTET_STRING);
     let bits = u16::try_from(part.bit_size).unwrap_or(0);
     let made = Entry::new(part.sub_index, code, access, &part.default).of_bits(bits).allow(more);

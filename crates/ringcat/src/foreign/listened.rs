@@ -5,7 +5,7 @@ use std::hash::{BuildHasher, RandomState};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::{Heard, LISTEN};
+use super::{ForeignFrame, LISTEN};
 
 /// Two MainDevices that begin at the same time do not listen equally long: the one that listens longer receives the
 /// other. Up to this time is added.
@@ -29,7 +29,7 @@ pub enum ListenedPhase {
     /// Frames are listened for.
     Listening,
     /// Another MainDevice drives it, whose first frame was this.
-    Occupied(Heard),
+    Occupied(ForeignFrame),
     /// No frame has arrived for long enough: the segment is driven.
     Free,
 }
@@ -72,9 +72,9 @@ impl Listened {
     }
 
     /// The first frame of the MainDevice that drives the segment.
-    pub fn heard(&self) -> Option<Heard> {
+    pub fn foreign_frame(&self) -> Option<ForeignFrame> {
         match self.phase() {
-            ListenedPhase::Occupied(heard) => Some(heard),
+            ListenedPhase::Occupied(frame) => Some(frame),
             _ => None,
         }
     }

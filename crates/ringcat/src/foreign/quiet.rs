@@ -10,7 +10,7 @@ use ringcat_engine::time::Instant;
 use ringcat_link::WakeUp;
 use ringcat_wire::frame::MacAddress;
 
-use super::{Heard, LAST_FRAMES, Listened, ListenedPhase, ListeningSockets, has_commands};
+use super::{ForeignFrame, LAST_FRAMES, Listened, ListenedPhase, ListeningSockets, has_commands};
 use crate::links::{Links, PerLink};
 use crate::text::address_of_sender;
 
@@ -115,8 +115,8 @@ impl Silence {
         let is_late = now.since(self.carriers_since[arrived_on.index()]) >= LAST_FRAMES;
         let Some(source) = address_of_sender(frame).filter(|_| is_late && has_commands(frame)) else { return };
         self.silent_since = now;
-        if self.listened.heard().is_none() {
-            self.listened.set(ListenedPhase::Occupied(Heard { arrived_on, source }));
+        if self.listened.foreign_frame().is_none() {
+            self.listened.set(ListenedPhase::Occupied(ForeignFrame { arrived_on, source }));
         }
     }
 
@@ -126,11 +126,11 @@ impl Silence {
             return false;
         }
         let binding = self.sockets.binding();
-        let has_heard = binding.is_some() && binding == self.binding;
-        if !has_heard {
+        let was_listening = binding.is_some() && binding == self.binding;
+        if !was_listening {
             (self.binding, self.silent_since) = (binding, now);
         }
-        has_heard
+        was_listening
     }
 }
 
@@ -346,15 +346,15 @@ mod tests {
         for (is_acyclic, link) in [(true, Link::Main), (true, Link::Redundant), (false, Link::Main)] {
             let mut bench = Bench::new(is_acyclic, [true; 2]);
             bench.arrives(link, 0x10);
-            assert_eq!(bench.listened.heard(), None, "its sender may have just ended");
+            assert_eq!(bench.listened.foreign_frame(), None, "its sender may have just ended");
             bench.run(30);
             bench.arrives(link, 0x40);
-            assert_eq!(bench.listened.heard(), None, "network variables");
+            assert_eq!(bench.listened.foreign_frame(), None, "network variables");
             bench.run(200);
             for _ in 0..100 {
                 bench.arrives(link, 0x10);
                 let source = MacAddress([0xff; 6]);
-                assert_eq!(bench.listened.heard(), Some(Heard { arrived_on: link, source }));
+                assert_eq!(bench.listened.foreign_frame(), Some(ForeignFrame { arrived_on: link, source }));
                 bench.run(240);
             }
             assert_eq!((bench.sent(), bench.passed_on), (0, 0));
@@ -378,7 +378,7 @@ mod tests {
 
     // covers: other-main-device
     #[test]
-    fn what_was_heard_without_a_socket_at_the_interface_does_not_count() {
+    fn frames_received_without_a_socket_at_the_interface_do_not_count() {
         let mut bench = Bench::new(true, [true; 2]);
         bench.sockets.0.store(DEAF, Ordering::Relaxed);
         bench.run(2_000);
@@ -404,11 +404,11 @@ mod tests {
             bench.world.borrow_mut().carriers = [true, turn % 2 == 0];
             bench.arrives(Link::Main, 0x10);
         }
-        assert_eq!(bench.listened.heard().map(|heard| heard.arrived_on), Some(Link::Main));
+        assert_eq!(bench.listened.foreign_frame().map(|frame| frame.arrived_on), Some(Link::Main));
         // A cable that is pulled out leads to the same segment when it comes back.
         bench.world.borrow_mut().carriers = [false; 2];
         bench.run(1_000);
-        assert!(bench.listened.heard().is_some() && bench.sent() == 0);
+        assert!(bench.listened.foreign_frame().is_some() && bench.sent() == 0);
         bench.world.borrow_mut().carriers = [true; 2];
         bench.run(251);
         assert_eq!((bench.sent(), bench.listened.phase()), (1, ListenedPhase::Free));

@@ -194,11 +194,6 @@ impl TwoHosts {
         self.shared.lock().slot(host).turn_around.set(turn_around);
     }
 
-    /// Sets how long the program of a host takes to send a frame.
-    pub fn set_send_time(&mut self, host: Host, time: Duration) {
-        self.shared.lock().slot(host).send_time = time;
-    }
-
     /// Frames that a program did not take in time, and that were lost.
     pub fn overruns(&self, host: Host) -> u64 {
         self.shared.lock().slot(host).overruns

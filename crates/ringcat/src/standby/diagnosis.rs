@@ -1,6 +1,6 @@
 //! What the ACTIVE has measured, for the INACTIVE (protocol MR-14, MR-19, REQ045).
 
-use ringcat_engine::main_device::HeardDiagnosis;
+use ringcat_engine::main_device::PartnerDiagnosis;
 
 use crate::acyclic::Inline;
 use crate::application::Application;
@@ -12,24 +12,24 @@ use crate::supervisor_thread::SupervisorThread;
 impl<L: Links> MainDevice<L> {
     /// What the ACTIVE has measured of the segment, with the counters of its frames and cycles, as of the last cycle
     /// that has arrived as a whole; `None` before one, and if this MainDevice is alone.
-    pub fn heard_diagnosis(&self) -> Option<HeardDiagnosis> {
-        self.engine.heard_diagnosis()
+    pub fn partner_diagnosis(&self) -> Option<PartnerDiagnosis> {
+        self.engine.partner_diagnosis()
     }
 }
 
 impl<L: Links> Application<L, Inline> {
-    /// As [`MainDevice::heard_diagnosis`]. Not for the cyclic path.
-    pub fn heard_diagnosis(&self) -> Option<HeardDiagnosis> {
-        self.acyclic.engine.heard_diagnosis()
+    /// As [`MainDevice::partner_diagnosis`]. Not for the cyclic path.
+    pub fn partner_diagnosis(&self) -> Option<PartnerDiagnosis> {
+        self.acyclic.engine.partner_diagnosis()
     }
 }
 
 impl SupervisorThread {
-    /// As [`MainDevice::heard_diagnosis`].
+    /// As [`MainDevice::partner_diagnosis`].
     ///
     /// # Errors
     /// The thread has ended.
-    pub fn heard_diagnosis(&self) -> Result<Option<HeardDiagnosis>, Error> {
-        self.act(|engine| engine.heard_diagnosis())
+    pub fn partner_diagnosis(&self) -> Result<Option<PartnerDiagnosis>, Error> {
+        self.act(|engine| engine.partner_diagnosis())
     }
 }

@@ -10,8 +10,8 @@ use crate::main_device::MainDevice;
 use crate::supervisor_thread::SupervisorThread;
 
 impl<L: Links> MainDevice<L> {
-    /// The end of the Ethernet to the other MainDevice, for any thread: it works before an application begins, while it
-    /// runs, and in both roles. `None` without
+    /// The endpoint of the Ethernet to the other MainDevice, for any thread: it works before an application begins,
+    /// while it runs, and in both roles. `None` without
     /// [`StandbyOptions::max_acyclic`](super::StandbyOptions::max_acyclic), and after the first call.
     pub fn partner_endpoint(&mut self) -> Option<PartnerEndpoint> {
         self.engine.partner_endpoint()

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use ringcat_engine::link::Link;
-use ringcat_engine::main_device::{ActivateError, Declaration, Heard};
+use ringcat_engine::main_device::{ActivateError, Declaration, PartnerStatus};
 use ringcat_engine::role::{RoleControl, RoleRequest};
 use ringcat_engine::time::Instant;
 use ringcat_engine::{Scan, ScanError};
@@ -63,25 +63,25 @@ impl Joining {
     /// reported.
     pub fn next<L: Links>(&mut self, main_device: &mut MainDevice<L>) -> Next {
         let has_link = Link::ALL.iter().any(|link| main_device.links.carrier(*link) != Some(false));
-        let (heard, now) = (main_device.heard(), main_device.now());
-        if let Some(notice) = self.look_out(&heard, now) {
+        let (partner, now) = (main_device.partner_status(), main_device.now());
+        if let Some(notice) = self.look_out(&partner, now) {
             main_device.engine.report_standby(notice.into(), now);
         }
-        self.decide(&heard, has_link, now)
+        self.decide(&partner, has_link, now)
     }
 
     /// Whether an alarm is to be reported. One that becomes ACTIVE has time to do so.
-    pub(crate) fn look_out(&mut self, heard: &Heard, now: Instant) -> Option<Notice> {
-        self.lookout.note(heard.at, if self.takes_over { self.limit * 2 } else { self.limit }, now)
+    pub(crate) fn look_out(&mut self, partner: &PartnerStatus, now: Instant) -> Option<Notice> {
+        self.lookout.note(partner.at, if self.takes_over { self.limit * 2 } else { self.limit }, now)
     }
 
-    pub(crate) fn decide(&mut self, heard: &Heard, has_link: bool, now: Instant) -> Next {
+    pub(crate) fn decide(&mut self, partner: &PartnerStatus, has_link: bool, now: Instant) -> Next {
         if !has_link {
             self.silent_since = now;
         }
-        self.silent_since = self.silent_since.max(heard.at.unwrap_or_default());
+        self.silent_since = self.silent_since.max(partner.at.unwrap_or_default());
         let is_silent = now.since(self.silent_since) >= self.limit;
-        match (heard.is_known, is_silent) {
+        match (partner.is_known, is_silent) {
             (_, true) if self.takes_over => Next::BecomeActive,
             (true, false) => Next::Follow,
             _ => Next::Listen,
@@ -97,8 +97,8 @@ impl<L: Links> MainDevice<L> {
     }
 
     /// What has arrived from the ACTIVE so far.
-    pub fn heard(&self) -> Heard {
-        self.engine.heard()
+    pub fn partner_status(&self) -> PartnerStatus {
+        self.engine.partner_status()
     }
 
     /// Frames that were forwarded so far.
@@ -110,17 +110,17 @@ impl<L: Links> MainDevice<L> {
     ///
     /// # Errors
     /// There is no redundant link.
-    pub fn listen(&mut self, time: Duration) -> Result<Heard, Error> {
+    pub fn listen(&mut self, time: Duration) -> Result<PartnerStatus, Error> {
         if self.links.addresses().redundant.is_none() {
             return Err(NeedsTwoLinks.into());
         }
         let end = self.now() + time;
-        while !self.heard().is_known && self.now() < end {
+        while !self.partner_status().is_known && self.now() < end {
             self.work();
             let wake = self.engine.next_deadline().unwrap_or(end);
             self.links.wait(wake.min(end));
         }
-        Ok(self.heard())
+        Ok(self.partner_status())
     }
 
     /// Becomes ACTIVE without an application, whatever the other MainDevice does: then a scan, or
@@ -136,14 +136,14 @@ impl<L: Links> MainDevice<L> {
     /// has as knowledge of the segment, and returns the declaration, the same as on the ACTIVE.
     ///
     /// # Errors
-    /// This MainDevice is ACTIVE, not all is known yet ([`Heard::is_known`]), or the declaration does not fit. The
-    /// error contains the MainDevice for another attempt.
+    /// This MainDevice is ACTIVE, not all is known yet ([`PartnerStatus::is_known`]), or the declaration does not fit.
+    /// The error contains the MainDevice for another attempt.
     pub fn follow(
         mut self,
         declare: impl FnOnce(&Scan) -> Declaration,
     ) -> Result<Application<L>, Box<Refused<MainDevice<L>>>> {
-        let known = self.engine.heard_knowledge().zip(self.engine.heard_configuration());
-        let Some(((knowledge, (session, _)), scan)) = known.zip(self.engine.heard_scan()) else {
+        let known = self.engine.partner_knowledge().zip(self.engine.partner_configuration());
+        let Some(((knowledge, (session, _)), scan)) = known.zip(self.engine.partner_scan()) else {
             let error = ActivateError::NoScan.into();
             return Err(Box::new(Refused { error, main_device: self }));
         };
@@ -201,7 +201,7 @@ impl<L: Links> MainDevice<L> {
             }
             match joining.next(&mut self) {
                 // What the ACTIVE has sent is known, and too old to be followed.
-                Next::Listen if self.heard().is_known => self.attend(SLICE),
+                Next::Listen if self.partner_status().is_known => self.attend(SLICE),
                 Next::Listen => {}
                 Next::Follow => break self.follow(declare)?,
                 Next::BecomeActive => {

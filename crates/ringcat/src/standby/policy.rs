@@ -127,9 +127,9 @@ pub(crate) struct Situation {
     /// When this MainDevice became INACTIVE.
     pub inactive_since: Instant,
     /// When process data of the other MainDevice came last since then.
-    pub heard_at: Option<Instant>,
+    pub partner_data_at: Option<Instant>,
     /// When any frame of another MainDevice came last.
-    pub heard_any_at: Option<Instant>,
+    pub partner_frame_at: Option<Instant>,
     /// The other one, of which a frame came while this one is ACTIVE.
     pub collided_with: Option<MacAddress>,
     /// Whether this one writes into the memory of a SubDevice.
@@ -178,13 +178,13 @@ impl Watch {
                 yields.then_some(RoleRequest::Inactive)
             }
             _ => {
-                let limit = match situation.heard_at {
+                let limit = match situation.partner_data_at {
                     Some(_) => self.time_out,
                     None => self.time_out + self.pause_of(situation.inactive_since),
                 };
                 // Until it has sent process data, an ACTIVE may be scanning. Then only process data counts.
-                let any = situation.heard_any_at.unwrap_or(Instant(0));
-                let silent_since = situation.heard_at.unwrap_or(situation.inactive_since.max(any));
+                let any = situation.partner_frame_at.unwrap_or(Instant(0));
+                let silent_since = situation.partner_data_at.unwrap_or(situation.inactive_since.max(any));
                 let is_over = self.policy.takes_over && now.since(silent_since) >= limit;
                 is_over.then_some(RoleRequest::Active)
             }
@@ -242,13 +242,13 @@ mod tests {
         Watch::new(policy, Duration::from_millis(1), OWN, Instant(0))
     }
 
-    fn inactive(heard_at: Option<u64>) -> Situation {
-        let heard_at = heard_at.map(|ms| Instant(ms * MS));
+    fn inactive(partner_data_at: Option<u64>) -> Situation {
+        let partner_data_at = partner_data_at.map(|ms| Instant(ms * MS));
         Situation {
             role: MainDeviceRole::Inactive,
             inactive_since: Instant(0),
-            heard_at,
-            heard_any_at: None,
+            partner_data_at,
+            partner_frame_at: None,
             collided_with: None,
             writes: false,
             other_writes: false,
@@ -276,10 +276,10 @@ mod tests {
     #[test]
     fn an_active_that_has_sent_no_process_data_yet_may_be_scanning() {
         let mut watch = watch(Policy::default());
-        let scans = Situation { heard_any_at: Some(Instant(90 * MS)), ..inactive(None) };
+        let scans = Situation { partner_frame_at: Some(Instant(90 * MS)), ..inactive(None) };
         assert_eq!(watch.decide(&scans, Instant(105 * MS - 1)), None);
         assert_eq!(watch.decide(&scans, Instant(120 * MS)), Some(RoleRequest::Active), "it has ended");
-        let hangs = Situation { heard_any_at: Some(Instant(114 * MS)), ..inactive(Some(100)) };
+        let hangs = Situation { partner_frame_at: Some(Instant(114 * MS)), ..inactive(Some(100)) };
         assert_eq!(watch.decide(&hangs, Instant(115 * MS)), Some(RoleRequest::Active), "its cycles hang");
     }
 

@@ -32,8 +32,8 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     }
 
     /// When process data of the other MainDevice came last, since this one is INACTIVE.
-    pub fn heard_at(&self) -> Option<Instant> {
-        self.cyclic.of_two.heard_at
+    pub fn partner_data_at(&self) -> Option<Instant> {
+        self.cyclic.of_two.partner_data_at
     }
 
     /// Frames that the cyclic half has forwarded as INACTIVE.

@@ -88,7 +88,7 @@ impl<S: Services> SubDevice<S> {
         self.ask_mailbox(move |mailbox| async move { coe::download(&mailbox, object, limits, &mut source).await })
     }
 
-    /// Indices of all objects that the SubDevice has (SDO information), asked of it.
+    /// Indices of all objects that the SubDevice has (SDO information), read from it.
     pub fn sdo_info(self) -> S::Outcome<Vec<u16>, SubDeviceError> {
         let limits = self.limits.of_message();
         self.ask_dictionary(move |dictionary| async move { dictionary.list(limits).await })

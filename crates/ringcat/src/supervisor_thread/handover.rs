@@ -2,6 +2,7 @@
 //! it knows.
 
 use std::sync::atomic::Ordering;
+use std::time::Duration;
 
 use ringcat_engine::Scan;
 use ringcat_engine::knowledge::{Handover, Knowledge};
@@ -11,6 +12,10 @@ use super::SupervisorThread;
 use crate::error::Error;
 use crate::links::Links;
 use crate::main_device::Options;
+
+/// Longest wait of a hand-over until ports are open that were closed for a moment: their temporary settings have expired
+/// by then.
+const OPENED: Duration = Duration::from_secs(2);
 
 impl SupervisorThread {
     /// Starts the thread as [`SupervisorThread::start`], and goes on with a segment that another process has known,
@@ -52,15 +57,21 @@ impl SupervisorThread {
     }
 
     /// Ends the thread without a further frame, and returns what is known of the segment, for another process that goes
-    /// on with it. All handles get [`Error::Gone`] from then on.
+    /// on with it. All handles get [`Error::Gone`] from then on. If ports are closed for a measurement of delays, waits
+    /// until they are open again, at most 2 s.
     ///
     /// # Errors
     /// The thread has ended.
     pub fn hand_over(&self) -> Result<Option<Knowledge>, Error> {
-        let published = self.0.published.clone();
-        self.act(move |engine| {
+        let (published, mut until) = (self.0.published.clone(), None);
+        let handed_over = self.ask(move |engine: &mut Engine| {
+            let now = engine.bus().now();
+            if engine.are_ports_altered() && now < *until.get_or_insert(now + OPENED) {
+                return None;
+            }
             published.is_handed_over.store(true, Ordering::Release);
-            engine.knowledge()
-        })
+            Some(engine.knowledge())
+        });
+        handed_over.wait()
     }
 }

@@ -72,7 +72,7 @@ impl SupervisorThread {
         let (published, mut declare) = (self.0.published.clone(), Some(declare));
         self.ask(move |engine: &mut Engine| {
             let declare = declare.take()?;
-            let known = engine.heard_knowledge().zip(engine.heard_configuration()).zip(engine.heard_scan());
+            let known = engine.partner_knowledge().zip(engine.partner_configuration()).zip(engine.partner_scan());
             let followed =
                 known.map(|((knowledge, (session, _)), scan)| engine.follow(declare(&scan), knowledge, session));
             published.states_of(engine);
@@ -102,15 +102,15 @@ impl<C: Links> Listening<C> {
                 return Err(self.refused(error.into()));
             }
             let has_link = self.supervisor.ring_status().links.iter().any(|link| link.carrier != Some(false));
-            let (heard, now) = (self.listener.heard(), self.links.now());
-            if let Some(notice) = joining.look_out(&heard, now) {
+            let (partner, now) = (self.listener.partner_status(), self.links.now());
+            if let Some(notice) = joining.look_out(&partner, now) {
                 // It does not wait: frames have to be forwarded.
                 let _ = self.supervisor.begin(move |engine, _| {
                     engine.report_standby(notice.into(), now);
                     Box::new(|_, _| true)
                 });
             }
-            match joining.decide(&heard, has_link, now) {
+            match joining.decide(&partner, has_link, now) {
                 Next::Listen => {}
                 Next::Follow => match self.follow(declare.clone()) {
                     Ok(Some(active)) => return Ok(self.run(active)),

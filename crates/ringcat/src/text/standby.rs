@@ -17,7 +17,7 @@ pub(super) fn describe(event: &Event, names: &Names) -> Option<String> {
                 || "no frame of another MainDevice has come".to_owned(),
                 |time| format!("the last cycle of the other MainDevice was {:.3} ms ago", time.as_secs_f64() * 1e3),
             );
-            let cut = cut.map_or_else(String::new, |write| format!("; was cut off, perhaps: {write}"));
+            let cut = cut.map_or_else(String::new, |write| format!("; possibly cut off: {write}"));
             match is_hot {
                 true => format!("taken over: {in_state} SubDevices go on as they are; {silence}{cut}"),
                 false => format!("taken over: all SubDevices are configured again from INIT on; {silence}{cut}"),

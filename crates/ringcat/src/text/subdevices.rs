@@ -56,7 +56,8 @@ pub(super) fn describe(event: &Event, names: &Names, ends: [Option<Occupant>; 2]
         Event::Emergency { subdevice, emergency } => {
             let (code, register) = (emergency.error_code, emergency.error_register);
             let (name, data) = (names.at_address(*subdevice), hex(&emergency.data));
-            format!("{name}: emergency {code:#06x}, error register {register:#04x}, data {data}")
+            let class = emergency.class_name().map(|class| format!(" ({class})")).unwrap_or_default();
+            format!("{name}: emergency {code:#06x}{class}, error register {register:#04x}, data {data}")
         }
         _ => return None,
     })

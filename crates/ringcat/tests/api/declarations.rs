@@ -56,7 +56,7 @@ fn what_is_wrong_is_named_and_the_main_device_is_there_for_another_try() -> Resu
     let again = vec![DomainMember::new(SubDeviceId(1))];
     twice.domains.push(DomainConfig::new(MILLISECOND, again));
     let (text, mut main_device) = refusal(main_device, twice);
-    assert_eq!(text, "activation: declaration 1: process data of SyncManager 0 is in domain 0 and in domain 1");
+    assert_eq!(text, "activation: SubDevice 1: process data of SyncManager 0 is in domain 0 and in domain 1");
 
     for under_way in [0, 5] {
         let (text, again) = refusal(main_device, good.clone().with_under_way(under_way));
@@ -67,22 +67,22 @@ fn what_is_wrong_is_named_and_the_main_device_is_there_for_another_try() -> Resu
     let mut boot = good.clone();
     boot.subdevices[2].target = AlState::Boot;
     let (text, main_device) = refusal(main_device, boot);
-    assert!(text.contains("declaration 2: expected target INIT, PREOP, SAFEOP or OP, got BOOT"), "{text}");
+    assert!(text.contains("SubDevice 2: expected target INIT, PREOP, SAFEOP or OP, got BOOT"), "{text}");
 
     let mut wrong = good.clone();
     wrong.subdevices[1] = SubDeviceConfig::at_position(1).expect_product(0xC47, 0x1234);
     let (text, main_device) = refusal(main_device, wrong);
-    assert!(text.contains("SubDevice 1: expected product code 0x00001234, got 0x07d80008"), "{text}");
+    assert!(text.contains("position 1: expected product code 0x00001234, got 0x07d80008"), "{text}");
 
     let mut wrong = good.clone();
     wrong.domains.clear();
     let (text, main_device) = refusal(main_device, wrong);
-    assert!(text.contains("declaration 1 has process data and there is no domain to exchange it"), "{text}");
+    assert!(text.contains("SubDevice 1 has process data and there is no domain to exchange it"), "{text}");
 
     let mut sync = good.clone();
     sync.subdevices[1].sync = Some(SyncSignals::sync0(300_000, 0));
     let (text, main_device) = refusal(main_device, sync);
-    let expected = "activation: declaration 1: SYNC0 every 300 us does not go with cycles of 1000 us: one must be a \
+    let expected = "activation: SubDevice 1: SYNC0 every 300 us does not go with cycles of 1000 us: one must be a \
                     multiple of the other";
     assert_eq!(text, expected);
 

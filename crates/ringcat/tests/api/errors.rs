@@ -9,7 +9,7 @@ use ringcat::wire::datagram::Target;
 use ringcat::wire::register::map;
 use ringcat::{
     ActivateError, BusError, ConfigureError, Declaration, Error, MainDevice, Options, Position, ScanError, SdoFailure,
-    ServiceError, StateError, StopError, SubDeviceConfig, SubDeviceId,
+    ServiceError, StateError, StopError, SubDeviceConfig, SubDeviceFailure, SubDeviceId,
 };
 
 const LIMIT: Duration = Duration::from_secs(10);
@@ -53,15 +53,15 @@ fn nested() -> Vec<Box<dyn StdError>> {
     let lost = BusError::Lost { target: Target::Broadcast(map::TYPE), retries: 3 };
     let errors = [
         Error::Scan(ScanError::Bus(lost)),
-        Error::Configure(ConfigureError::Bus(lost)),
-        Error::Configure(ConfigureError::State(StateError::Bus(lost))),
         Error::Service(ServiceError::Bus(lost)),
         Error::Stop(StopError::Bus(lost)),
         Error::Activate(ActivateError::NoScan),
         Error::Thread(io::Error::other("no more threads")),
         Error::TimedOut { limit: LIMIT },
     ];
-    errors.into_iter().map(|error| Box::new(error) as Box<dyn StdError>).collect()
+    let of_states = [ConfigureError::Bus(lost), ConfigureError::State(StateError::Bus(lost))];
+    let of_states = of_states.map(|error| Box::new(SubDeviceFailure::State(error)) as Box<dyn StdError>);
+    errors.into_iter().map(|error| Box::new(error) as Box<dyn StdError>).chain(of_states).collect()
 }
 
 // covers: api
@@ -91,7 +91,7 @@ fn causes<'a, E: StdError + 'static>(error: &'a (dyn StdError + 'static)) -> Vec
 #[test]
 fn a_cause_is_found_by_its_type_however_deep_it_is() -> Result<(), Box<dyn StdError>> {
     let lost = BusError::Lost { target: Target::Broadcast(map::TYPE), retries: 3 };
-    let deep = Error::Configure(ConfigureError::State(StateError::Bus(lost)));
+    let deep = SubDeviceFailure::State(ConfigureError::State(StateError::Bus(lost)));
     assert_eq!(causes::<BusError>(&deep), [&lost]);
     let mut device = main_device("[segment]\n[[device]]\ntype = \"all-protocols\"\n")?;
     device.scan()?;

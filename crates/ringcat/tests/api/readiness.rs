@@ -88,7 +88,7 @@ fn a_refused_activation_is_an_error_like_any_other_and_names_the_subdevice() -> 
         Ok(())
     }
     let error = activate().expect_err("another product");
-    assert!(error.to_string().starts_with("activation: declaration 1: "), "{error}");
+    assert!(error.to_string().starts_with("activation: SubDevice 1: "), "{error}");
     let refused = error.downcast_ref::<Box<Refused<MainDevice<SimulatedSegment>>>>().expect("its own type");
     assert!(matches!(refused.error, Error::Activate(ActivateError::Config { .. })), "{refused:?}");
     Ok(())

@@ -11,12 +11,13 @@ use std::time::{Duration, Instant};
 use ringcat::shared_segment::SharedSegment;
 use ringcat::{
     CycleJob, Direction, DomainId, Ended, Error, FramesIn, JobProbe, LastOutputs, Link, Links, MainDeviceRole,
-    NoSnapshot, Options, Position, SubDeviceId, SupervisorThread, automatic,
+    NoSnapshot, Options, Position, Services, SubDeviceId, SupervisorThread, automatic,
 };
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
 use ringcat_wire::al::{AlState, AlStatus};
 use ringcat_wire::frame::MacAddress;
+use ringcat_wire::register::map;
 
 const SEGMENT: &str = "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\n\
                        type = \"digital-output-8\"\n\
@@ -47,6 +48,7 @@ fn two_threads_reach_op_exchange_data_and_stop_in_order() -> Result<(), Error> {
     let scan = supervisor.scan()?;
     assert_eq!(scan.subdevices.len(), 3);
     let application = supervisor.activate(automatic(&scan.subdevices, PERIOD), cyclic)?;
+    assert_eq!(application.supervisor().subdevices()?.len(), 3);
     let output = application.entry(SubDeviceId(1), 0x7000, 1).expect("the terminal's first channel");
     let cycles = application.start_cycles(
         || (),
@@ -73,6 +75,29 @@ fn two_threads_reach_op_exchange_data_and_stop_in_order() -> Result<(), Error> {
     });
     assert_eq!(supervisor.scan()?.subdevices.len(), 3, "a stopped MainDevice scans again");
     assert!(links.now() > ringcat::Instant(0));
+    Ok(())
+}
+
+/// A measurement of delays has opened the ring: the next owner of the segment finds it closed.
+// covers: daemon, ring-goes-on
+#[test]
+fn a_hand_over_waits_for_the_end_of_a_measurement_that_has_opened_the_ring() -> Result<(), Error> {
+    let loops = |network: &mut Network| -> Vec<u8> {
+        network.devices().map(|device| device.controller.register(map::DL_CONTROL, 2)[1]).collect()
+    };
+    let mut opened = 0;
+    while opened < 5 {
+        let (cyclic, acyclic) = SharedSegment::halves(network());
+        let plant = cyclic.plant();
+        let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
+        supervisor.scan()?;
+        let mut report = supervisor.background().port_report();
+        let is_open = || plant.with_network(|network| loops(network) != [0; 3]);
+        until("it ends, or the ring is open", || is_open() || report.take().is_some());
+        opened += u32::from(is_open());
+        assert!(supervisor.hand_over()?.is_some());
+        assert_eq!(plant.with_network(loops), [0; 3]);
+    }
     Ok(())
 }
 

@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use ringcat::standby::{ForwardingCounters, RoleRequest};
 use ringcat::{Instant, RingState};
 
-use crate::talk::Speaker;
+use crate::ethernet_peer::EthernetPeer;
 
 /// What a MainDevice does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -54,7 +54,7 @@ pub struct Seen {
     /// Events of MainDevice redundancy, as text.
     pub events: Vec<String>,
     /// Ethernet frames to and from the other one.
-    pub talk: Speaker,
+    pub ethernet: EthernetPeer,
 }
 
 impl Seen {
@@ -77,7 +77,7 @@ pub struct Board {
     seen: Mutex<Seen>,
     is_asked_to_stop: AtomicBool,
     /// Ethernet frames per cycle.
-    says: AtomicUsize,
+    frames_per_cycle: AtomicUsize,
     request: Mutex<Option<RoleRequest>>,
 }
 
@@ -108,14 +108,14 @@ impl Board {
         self.request.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
-    /// The program is to have Ethernet to the other one, and to send so many frames in each cycle.
-    pub fn ask_to_say(&self, frames: usize) {
-        self.says.store(frames, Ordering::Relaxed);
+    /// The program is to have Ethernet to the other one, and to send this number of frames in each cycle.
+    pub fn set_frames_per_cycle(&self, frames: usize) {
+        self.frames_per_cycle.store(frames, Ordering::Relaxed);
     }
 
-    /// How many.
-    pub fn says(&self) -> usize {
-        self.says.load(Ordering::Relaxed)
+    /// That number.
+    pub fn frames_per_cycle(&self) -> usize {
+        self.frames_per_cycle.load(Ordering::Relaxed)
     }
 
     /// The program is to stop in order.

@@ -13,7 +13,7 @@ use ringcat_wire::frame::MacAddress;
 
 use super::board::{Board, Phase};
 use super::programs::{CYCLE, outputs_of};
-use crate::talk::Speaker;
+use crate::ethernet_peer::EthernetPeer;
 
 /// Cycles without the ACTIVE after which the other one takes over.
 pub const TIME_OUT_CYCLES: u32 = 3;
@@ -60,23 +60,23 @@ fn run(mut links: HostLinks, board: &Board, listen: Duration, policy: Policy) {
 }
 
 /// Ethernet frames to and from the other one.
-struct Talk {
+struct EthernetTraffic {
     endpoint: Option<PartnerEndpoint>,
-    speaker: Speaker,
+    peer: EthernetPeer,
 }
 
-impl Talk {
-    fn new(main_device: &mut MainDevice<HostLinks>) -> Talk {
+impl EthernetTraffic {
+    fn new(main_device: &mut MainDevice<HostLinks>) -> EthernetTraffic {
         let MacAddress([.., last]) = main_device.links_mut().addresses().main;
-        let speaker = Speaker::new(last >> 4 & 1, (main_device.now().0 / CYCLE.as_nanos() as u64) as u16);
-        Talk { endpoint: main_device.partner_endpoint(), speaker }
+        let peer = EthernetPeer::new(last >> 4 & 1, (main_device.now().0 / CYCLE.as_nanos() as u64) as u16);
+        EthernetTraffic { endpoint: main_device.partner_endpoint(), peer }
     }
 
     fn step(&mut self, board: &Board) {
         let Some(endpoint) = &mut self.endpoint else { return };
-        self.speaker.listen(endpoint);
-        self.speaker.say(endpoint, board.says());
-        board.note(|seen| seen.talk = self.speaker.clone());
+        self.peer.receive(endpoint);
+        self.peer.send(endpoint, board.frames_per_cycle());
+        board.note(|seen| seen.ethernet = self.peer.clone());
     }
 }
 
@@ -90,12 +90,12 @@ struct Shown {
 }
 
 fn exchange(links: HostLinks, board: &Board, listen: Duration, policy: Policy) -> Result<(), Error> {
-    let most = if board.says() > 0 { MAX_ACYCLIC } else { 0 };
+    let most = if board.frames_per_cycle() > 0 { MAX_ACYCLIC } else { 0 };
     let options = Options::default().with_standby(StandbyOptions::default().with_max_acyclic(most));
     let mut main_device = MainDevice::request(links, &options);
-    let mut talk = Talk::new(&mut main_device);
+    let mut ethernet = EthernetTraffic::new(&mut main_device);
     let joining = Joining::begin(&main_device, &policy.with_listen(listen));
-    let mut application = join(main_device, joining, &policy, board, &mut talk)?;
+    let mut application = join(main_device, joining, &policy, board, &mut ethernet)?;
     application.set_policy(Some(policy));
     let outputs = outputs_of(&application, application.states().len());
     let mut is_running = application.role() == MainDeviceRole::Inactive;
@@ -113,7 +113,7 @@ fn exchange(links: HostLinks, board: &Board, listen: Duration, policy: Policy) -
             board.note(|seen| seen.begin(phase, data.now()));
             work(data, &outputs)
         });
-        talk.step(board);
+        ethernet.step(board);
         is_running |= application.all_settled() && shown.is_complete;
         // All SubDevices are configured again.
         is_running &= !note(board, &mut application, &shown);
@@ -128,12 +128,12 @@ fn join(
     mut joining: Joining,
     policy: &Policy,
     board: &Board,
-    talk: &mut Talk,
+    ethernet: &mut EthernetTraffic,
 ) -> Result<Application<HostLinks>, Error> {
     let declare = |scan: &Scan| automatic(&scan.subdevices, CYCLE);
     loop {
         main_device.listen(SLICE)?;
-        talk.step(board);
+        ethernet.step(board);
         while let Some(event) = main_device.pop_event() {
             if let Event::Standby(event) = event.event {
                 board.note(|seen| seen.events.push(format!("{event:?}")));

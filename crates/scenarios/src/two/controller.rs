@@ -49,7 +49,7 @@ pub struct Controller {
     settings: Settings,
     /// Its acyclic half.
     pub engine: Engine,
-    /// The end of its Ethernet to the other one, with `max_acyclic`.
+    /// The endpoint of its Ethernet to the other one, with `max_acyclic`.
     pub endpoint: Option<PartnerEndpoint>,
     control: RoleControl,
     running: Option<Running>,
@@ -293,10 +293,10 @@ impl Controller {
                     let _ = self.engine.start_scan();
                 }
             },
-            MainDeviceRole::Inactive if self.engine.heard().is_known => {
-                let knowledge = self.engine.heard_knowledge().expect("it is known");
-                let (session, _) = self.engine.heard_configuration().expect("it is known");
-                let declaration = (self.settings.declare)(&self.engine.heard_scan().expect("it is known"));
+            MainDeviceRole::Inactive if self.engine.partner_status().is_known => {
+                let knowledge = self.engine.partner_knowledge().expect("it is known");
+                let (session, _) = self.engine.partner_configuration().expect("it is known");
+                let declaration = (self.settings.declare)(&self.engine.partner_scan().expect("it is known"));
                 let active = self.engine.follow(declaration, knowledge, session).expect("the declaration fits");
                 self.run(active);
             }

@@ -72,7 +72,7 @@ impl Taps {
         self.controllers[side].as_ref().expect("it runs")
     }
 
-    /// The other one is ready, as the one on this side has said last.
+    /// The other one is ready, as the one on this side has reported last.
     fn await_ready(&self, side: usize) {
         let controller = self.of(side);
         await_that(READY, &[controller], || {

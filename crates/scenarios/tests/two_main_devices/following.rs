@@ -102,13 +102,13 @@ fn states_of_an_inactive_are_unknown_as_long_as_no_active_reports_them() {
 fn counters_of_the_active_are_readable_at_the_inactive() {
     let mut two = followed();
     two.run(Duration::from_millis(100));
-    let before = two.controllers[1].engine.heard_diagnosis().expect("it has come");
+    let before = two.controllers[1].engine.partner_diagnosis().expect("it has come");
     assert!(before.at.is_some_and(|at| two.now().since(at) <= 2 * CYCLE));
     assert_eq!((before.counters.ring, before.counters.carriers), (1, 0b1010));
     assert_eq!(before.counters.answering, [8, 0]);
     two.fault(Fault::Cut(CableId(4)));
     two.run(Duration::from_millis(100));
-    let after = two.controllers[1].engine.heard_diagnosis().expect("it has come");
+    let after = two.controllers[1].engine.partner_diagnosis().expect("it has come");
     assert_eq!((after.counters.ring, after.counters.answering), (2, [4, 4]), "{}", two.log());
     let own = *two.controllers[0].exchange().counters();
     // The diagnosis is of the cycle before, and the last one is still under way.
@@ -118,7 +118,7 @@ fn counters_of_the_active_are_readable_at_the_inactive() {
     assert_eq!([after.counters.lost, after.counters.incomplete], [lost, incomplete]);
     assert_eq!(after.domains.len(), 1);
     assert_eq!((after.domains[0].state, after.domains[0].wkc), (2, after.domains[0].expected));
-    assert!(two.controllers[0].engine.heard_diagnosis().is_none(), "it is ACTIVE, and has heard none");
+    assert!(two.controllers[0].engine.partner_diagnosis().is_none(), "it is ACTIVE, and has received none");
 }
 
 // covers: MR-13, standby
@@ -126,11 +126,11 @@ fn counters_of_the_active_are_readable_at_the_inactive() {
 fn descriptions_of_objects_are_no_part_of_the_knowledge_of_the_other_one() {
     let lengths = |two: &Two| {
         let known = two.controllers[0].engine.knowledge().expect("it has scanned").to_bytes().len();
-        [known, two.controllers[1].engine.heard_knowledge().expect("it has arrived").to_bytes().len()]
+        [known, two.controllers[1].engine.partner_knowledge().expect("it has arrived").to_bytes().len()]
     };
     let mut two = followed();
     two.run(Duration::from_secs(6));
-    let [known, heard] = lengths(&two);
+    let [known, received] = lengths(&two);
     let engine = &mut two.controllers[0].engine;
     let mailbox = engine.mailbox(SubDeviceId(3)).expect("it is declared");
     let dictionary = engine.dictionaries().of(&mailbox, engine.identity(SubDeviceId(3)));
@@ -146,9 +146,9 @@ fn descriptions_of_objects_are_no_part_of_the_knowledge_of_the_other_one() {
     assert!(matches!(read, Some(Ok(_))), "{read:?}");
     // Each 5 s all is published again.
     two.run(Duration::from_secs(6));
-    let [known_now, heard_now] = lengths(&two);
+    let [known_now, received_now] = lengths(&two);
     assert!(known_now > known + 50, "{known} bytes, then {known_now}");
-    assert_eq!(heard_now, heard, "bytes that the other one has");
+    assert_eq!(received_now, received, "bytes that the other one has");
     assert!(two.controllers[0].partner().is_ready(), "{:?}", two.controllers[0].partner());
 }
 
@@ -189,7 +189,7 @@ fn without_an_active_an_inactive_waits_for_ever_and_its_application_decides() {
     let mut two = Two::new(ring_of_two(4, Host::First), declare, standby());
     two.run(Duration::from_secs(2));
     assert!(two.controllers.iter().all(|it| it.engine.role() == MainDeviceRole::Inactive && it.sent_inactive == 0));
-    assert!(two.controllers.iter().all(|it| it.engine.heard().at.is_none()));
+    assert!(two.controllers.iter().all(|it| it.engine.partner_status().at.is_none()));
     two.controllers[1].begin_active();
     two.until(Duration::from_secs(5), "the partner is ready", |two| {
         two.all_in_op() && two.controllers[1].partner().is_ready()

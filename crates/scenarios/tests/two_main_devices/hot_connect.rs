@@ -158,7 +158,7 @@ fn a_group_joins_while_a_takeover_happens_and_leaves_with_the_active() {
 
 // covers: MR-23, REQ044, hot-connect, standby
 #[test]
-fn both_know_a_group_that_joins_under_the_active_and_the_other_one_goes_on_with_it() {
+fn both_have_a_group_that_joins_under_the_active_and_the_other_one_goes_on_with_it() {
     let mut two = followed(false);
     power(&mut two, true);
     until_joined(&mut two, 0);

@@ -11,25 +11,25 @@ use super::ring_of_two;
 /// Longest time without outputs when a role is handed over.
 const HANDED_OVER_GAP: Duration = CYCLE.saturating_add(Duration::from_micros(600));
 
-fn talking(seed: u64) -> Pair {
+fn pair_with_ethernet(seed: u64) -> Pair {
     let mut pair = Pair::without_programs(seed, ring_of_two(8, Host::First));
-    pair.let_members_talk(2);
+    pair.let_members_send_frames(2);
     pair.with_members()
 }
 
 /// Frames that each side has received, and those that it has missed; nothing was wrong.
 fn counts(pair: &Pair) -> [(u64, u64); 2] {
     Host::ALL.map(|host| {
-        let talk = pair.seen(host).talk;
-        assert_eq!(talk.fault, None, "{host:?} {}", pair.log());
-        (talk.received, talk.missed)
+        let peer = pair.seen(host).ethernet;
+        assert_eq!(peer.fault, None, "{host:?} {}", pair.log());
+        (peer.received, peer.missed)
     })
 }
 
 // covers: 9.12, AC-01, AC-02, REQ034, REQ036, REQ040, MR-07, standby
 #[test]
 fn two_programs_of_the_library_exchange_ethernet_frames_in_both_roles() {
-    let mut pair = talking(21);
+    let mut pair = pair_with_ethernet(21);
     let (mut active, mut other) = (Host::First, Host::Second);
     for round in 0..20 {
         pair.run_cycles(100);
@@ -53,7 +53,7 @@ fn two_programs_of_the_library_exchange_ethernet_frames_in_both_roles() {
 // covers: AC-05, MR-07, MR-26, REQ034, standby
 #[test]
 fn ethernet_goes_on_with_a_controller_that_was_killed_and_comes_back() {
-    let mut pair = talking(22);
+    let mut pair = pair_with_ethernet(22);
     let (mut active, mut other) = (Host::First, Host::Second);
     for _ in 0..3 {
         pair.hosts().guard(active, CYCLE);

@@ -48,7 +48,7 @@ fn refused(two: &Two, controller: usize) -> Vec<MemoryWrite> {
     two.standby_events(controller).into_iter().filter_map(refused).collect()
 }
 
-/// What the event of a takeover says was cut off.
+/// The write that the event of a takeover names as cut off.
 fn cut(two: &Two, controller: usize) -> Option<MemoryWrite> {
     let took_over = |event: &StandbyEvent| match event {
         StandbyEvent::TookOver { cut, .. } => Some(*cut),
@@ -133,7 +133,7 @@ fn an_eeprom_that_is_written_and_a_subdevice_in_boot_keep_the_role() {
 
 // covers: standby, MR-10
 #[test]
-fn in_a_collision_each_one_knows_which_of_both_writes() {
+fn in_a_collision_both_determine_which_of_them_writes() {
     let mut two = in_op();
     let written = write_file(&mut two, 200_000);
     two.controllers[1].control().force(RoleRequest::Active);

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use ringcat::{
-    Application, DomainId, EngineKey, Error, Event, Limits, LogFilter, MainDevice, Options, Position, SdoAddress,
-    Services, SubDeviceId, Subject, Subjects, TimedEvent, automatic, text,
+    Application, DomainId, Error, Event, LogFilter, MainDevice, Options, Position, Services, SubDeviceId, Subject,
+    Subjects, TimedEvent, TransferLimits, automatic, text,
 };
 use ringcat_engine::{Class, class_of};
 use ringcat_sim::cable::DeviceIndex;
@@ -17,13 +17,12 @@ use ringcat_wire::frame::Frame;
 use ringcat_wire::register::map;
 use scenarios::segments::{descriptions, line, ring};
 use scenarios::tap::Tap;
-use scenarios::uploads::start_upload;
 use scenarios::witness::{Frames, Passed, Witness};
 use scenarios::world::CYCLE;
 
 const FOLLOWED: Duration = Duration::from_millis(400);
 const LIMIT: Duration = Duration::from_secs(5);
-const LIMITS: Limits = Limits::new(Duration::from_secs(1), Duration::from_secs(5));
+const LIMITS: TransferLimits = TransferLimits::new(Duration::from_secs(1), Duration::from_secs(5)).with_bytes(200_000);
 
 type Links = Witness<Tap>;
 /// Byte 1 of the source address, and Idx.
@@ -183,10 +182,7 @@ fn mail_states_and_polls_of_an_undisturbed_segment_give_no_report() {
         main_device.set_command_reports(true);
         main_device.set_log_filter(LogFilter::default());
         let client = main_device.register_client(Subjects::NONE.with(Subject::Commands), 1000).expect("there is room");
-        let large = SdoAddress::new(0x2002, 0);
-        let read = Services::call(&mut main_device, EngineKey, move |engine| {
-            start_upload(engine, Position(1), large, LIMITS, 200_000)
-        });
+        let read = main_device.subdevice(Position(1)).limits(LIMITS).sdo_read::<Vec<u8>>(0x2002, 0);
         assert_eq!(read.expect("it answers").len(), 100_000);
         main_device.attend(Duration::from_secs(2));
         let declaration = automatic(&main_device.subdevices(), CYCLE);

@@ -52,7 +52,7 @@ fn the_expected_product_is_compared_and_a_mismatch_names_both() {
         3 => config.expect_product(0x0C47, 0x1234_5678),
         _ => config,
     });
-    assert!(text.contains("SubDevice 3: expected product code 0x12345678, got 0x0bf00004"), "{text}");
+    assert!(text.contains("position 3: expected product code 0x12345678, got 0x0bf00004"), "{text}");
 }
 
 #[test]
@@ -66,7 +66,7 @@ fn two_swapped_subdevices_are_reported_by_the_first_wrong_place() {
         Ok(_) => panic!("swapped SubDevices were taken"),
         Err(error) => error.to_string(),
     };
-    assert!(text.contains("SubDevice 2: expected product code 0x07d80008, got 0x07d80010"), "{text}");
+    assert!(text.contains("position 2: expected product code 0x07d80008, got 0x07d80010"), "{text}");
 }
 
 #[test]
@@ -123,7 +123,7 @@ fn a_duplicate_alias_is_an_event_and_an_error_if_it_is_declared() {
         3 => SubDeviceConfig::at_alias(99, 0),
         _ => config,
     });
-    assert!(text.contains("alias 99 belongs to SubDevice 3 and to SubDevice 9"), "{text}");
+    assert!(text.contains("alias 99 belongs to position 3 and to position 9"), "{text}");
 }
 
 // covers: declaration

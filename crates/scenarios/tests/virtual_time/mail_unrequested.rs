@@ -183,10 +183,10 @@ fn vendor_messages_without_a_request_reach_the_application_by_its_handle() {
     let error = world.finish(Duration::from_secs(1), receiving).expect_err("no message");
     assert!(error.to_string().contains("100 ms"), "{error}");
     // Mail of an unknown type is kept as it is.
-    post(&mut world, UNKNOWN, b"news");
+    post(&mut world, UNKNOWN, b"note");
     world.run_cycles(20);
     let mut take = |kind| world.application_mut().subdevice(SubDeviceId(ALL)).take_unsolicited(kind);
-    assert_eq!(take(Unsolicited::Other).map(|mail| (mail.protocol, mail.payload)), Some((UNKNOWN, b"news".to_vec())));
+    assert_eq!(take(Unsolicited::Other).map(|mail| (mail.protocol, mail.payload)), Some((UNKNOWN, b"note".to_vec())));
     assert_eq!((take(Unsolicited::Other), take(Unsolicited::Voe)), (None, None));
 }
 

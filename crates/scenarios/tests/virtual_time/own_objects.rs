@@ -200,7 +200,7 @@ fn faults_of_a_subdevice_are_counted_and_kept_in_the_history() {
     let refused = world.run(async move { coe::read(&mailbox, SdoAddress::new(0x7777, 0), limits, 8).await });
     assert!(refused.is_err());
     assert!(world.network_mut().device_mut(DeviceIndex(2)).application.diagnose(&message(), &[]));
-    assert_eq!(seen(&mut world), [0, 0, 0x0602_0000, 1], "an abort of its, and news in its own history");
+    assert_eq!(seen(&mut world), [0, 0, 0x0602_0000, 1], "an abort of its, and a message in its own history");
     // Two lost frames with data of all SubDevices.
     world.drop(CableId(0), 2);
     world.drop(CableId(5), 2);

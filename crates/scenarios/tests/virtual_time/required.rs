@@ -79,7 +79,7 @@ fn a_right_identification_is_no_mismatch() {
     assert_eq!(world.scan.subdevices[2].identification, Some(0x1234));
     assert_eq!(world.scan.subdevices[1].identification, None);
     let error = activate(|devices| devices[2].identification = Some(0x1235), declare).expect_err("another one");
-    assert!(error.to_string().contains("SubDevice 2: expected identification 0x00001234, got 0x00001235"), "{error}");
+    assert!(error.to_string().contains("position 2: expected identification 0x00001234, got 0x00001235"), "{error}");
 }
 
 // covers: 4.3, mandatory

@@ -14,7 +14,7 @@ const WORDS: usize = KNOWLEDGE_ROOM / KNOWLEDGE_GRAIN / 64;
 
 /// The knowledge on its way.
 #[derive(Debug)]
-pub(super) struct HeardKnowledge {
+pub(super) struct ReceivedKnowledge {
     /// Version and length of what is on its way, or has arrived.
     version: Option<(u16, usize)>,
     /// One bit per grain that has arrived.
@@ -22,13 +22,13 @@ pub(super) struct HeardKnowledge {
     left: usize,
 }
 
-impl Default for HeardKnowledge {
-    fn default() -> HeardKnowledge {
-        HeardKnowledge { version: None, arrived: vec![0; WORDS].into_boxed_slice(), left: 0 }
+impl Default for ReceivedKnowledge {
+    fn default() -> ReceivedKnowledge {
+        ReceivedKnowledge { version: None, arrived: vec![0; WORDS].into_boxed_slice(), left: 0 }
     }
 }
 
-impl HeardKnowledge {
+impl ReceivedKnowledge {
     /// Nothing is on its way. In the cyclic path: the room stays.
     pub fn forget(&mut self) {
         (self.version, self.left) = (None, 0);
@@ -48,16 +48,16 @@ impl HeardKnowledge {
     }
 
     /// Takes a piece.
-    pub fn take(&mut self, heard: &Sheet, offset: usize, bytes: &[u8]) {
+    pub fn take(&mut self, sheet: &Sheet, offset: usize, bytes: &[u8]) {
         let Some((_, length)) = self.version else { return };
         if self.left == 0 || offset >= length || !offset.is_multiple_of(KNOWLEDGE_GRAIN) {
             return;
         }
-        if heard.version().is_some() {
-            heard.begin();
+        if sheet.version().is_some() {
+            sheet.begin();
         }
         let bytes = &bytes[..bytes.len().min(length - offset)];
-        heard.put(offset, bytes);
+        sheet.put(offset, bytes);
         for grain in offset / KNOWLEDGE_GRAIN..(offset + bytes.len()).div_ceil(KNOWLEDGE_GRAIN) {
             let Some(word) = self.arrived.get_mut(grain / 64) else { return };
             let bit = 1 << (grain % 64);
@@ -65,7 +65,7 @@ impl HeardKnowledge {
             *word |= bit;
         }
         if self.left == 0 {
-            heard.end(length);
+            sheet.end(length);
         }
     }
 }

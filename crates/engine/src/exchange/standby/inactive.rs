@@ -28,7 +28,7 @@ impl Exchange {
         if let Some(state) = self.standby.0.as_deref_mut()
             && state.role == MainDeviceRole::Inactive
         {
-            state.words.post_heard(now);
+            state.words.post_partner_frame(now);
             state.following.fill(arrived_on, frame, now);
         }
     }

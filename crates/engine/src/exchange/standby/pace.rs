@@ -28,14 +28,14 @@ impl Exchange {
     }
 
     /// When a frame of the ACTIVE came last; `None` if none has come since this MainDevice is INACTIVE.
-    pub fn heard_at(&self) -> Option<Instant> {
+    pub fn partner_data_at(&self) -> Option<Instant> {
         self.standby.0.as_deref()?.following.newest().map(|(_, at)| at)
     }
 
     /// When a frame of another MainDevice came last while this one was INACTIVE, whatever it contains: one that scans
     /// sends no process data yet.
-    pub fn heard_any_at(&self) -> Option<Instant> {
-        self.standby.0.as_deref()?.words.heard_at()
+    pub fn partner_frame_at(&self) -> Option<Instant> {
+        self.standby.0.as_deref()?.words.partner_frame_at()
     }
 }
 

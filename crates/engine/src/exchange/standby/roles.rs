@@ -176,13 +176,13 @@ impl State {
     /// What this MainDevice goes on with as ACTIVE. SubDevices stay as they are only if their registers are those of
     /// this configuration; otherwise they are configured again from INIT on, which is a warm takeover (protocol MR-18).
     fn takeover(&self) -> Takeover {
-        let (own, heard_at) = (&self.frames.header, self.words.heard_at());
+        let (own, frame_at) = (&self.frames.header, self.words.partner_frame_at());
         let is_same = |other: &Header| other.identity == own.identity && other.session == own.session;
         match self.following.whole() {
             _ if self.goes_through_init => Takeover::ThroughInit,
             Some(whole) if is_same(&whole.header) => Takeover::FromOther,
             // A frame that arrived at the time of the change counts: it may be a frame of another ACTIVE.
-            None if self.left_at.is_some_and(|left| heard_at.is_none_or(|at| at < left)) => Takeover::FromItself,
+            None if self.left_at.is_some_and(|left| frame_at.is_none_or(|at| at < left)) => Takeover::FromItself,
             _ => Takeover::ThroughInit,
         }
     }

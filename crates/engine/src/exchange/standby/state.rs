@@ -69,7 +69,7 @@ pub(in crate::exchange) struct State {
     pub acyclic_counts_from: u64,
     /// Its sender, until the application has asked for it.
     pub collided_with: Option<MacAddress>,
-    /// The write into the memory of a SubDevice that it does, as its last master frame says.
+    /// The write into the memory of a SubDevice that it does, according to its last master frame.
     pub collided_write: Option<MemoryWrite>,
     /// A version of the ACTIVE that cannot be read, and was reported.
     pub other_version: Option<u8>,

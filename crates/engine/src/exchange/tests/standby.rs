@@ -219,15 +219,15 @@ fn knowledge_arrives_piece_by_piece_and_a_newer_one_replaces_it() {
     let bytes = |first: usize, count: usize| (first..first + count).map(|it| it as u8).collect::<Vec<u8>>();
     assert!(duo.first.words.knowledge.write(&bytes(3, 1000)));
     (0..11).for_each(|_| duo.cycle());
-    assert_eq!(duo.second.words.heard.copy().map(|(_, bytes)| bytes), Some(bytes(3, 1000)));
+    assert_eq!(duo.second.words.partner_knowledge.copy().map(|(_, bytes)| bytes), Some(bytes(3, 1000)));
     // A lost cycle costs a round of pieces.
     assert!(duo.first.words.knowledge.write(&bytes(5, 777)));
     duo.cycle();
-    assert_eq!(duo.second.words.heard.copy(), None, "it is on its way");
+    assert_eq!(duo.second.words.partner_knowledge.copy(), None, "it is on its way");
     duo.drop_frame(is_master_frame);
     duo.cycle();
     duo.is_losing = false;
     (0..20).for_each(|_| duo.cycle());
-    assert_eq!(duo.second.words.heard.copy().map(|(_, bytes)| bytes), Some(bytes(5, 777)));
+    assert_eq!(duo.second.words.partner_knowledge.copy().map(|(_, bytes)| bytes), Some(bytes(5, 777)));
     assert_eq!(duo.first.fragment_lengths().iter().find(|(area, _)| *area == Area::Knowledge).unwrap().1, 104);
 }

@@ -1,9 +1,9 @@
 //! Object dictionaries that were read before, by type of SubDevice (protocol 6.3, decision 0155).
 //!
 //! Of one type are SubDevices with the same vendor, product, revision, software version (0x100A) and list of objects.
-//! The list is asked of a SubDevice once in each session of its mailbox; the descriptions follow from its type. Those
-//! that no SubDevice of the type has returned yet are asked for. Modular SubDevices have no type: their objects depend
-//! on the modules.
+//! The list is read from a SubDevice once in each session of its mailbox; the descriptions follow from its type. Those
+//! that no SubDevice of the type has returned yet are read. Modular SubDevices have no type: their objects depend on
+//! the modules.
 
 use alloc::collections::BTreeMap;
 use alloc::rc::Rc;
@@ -24,7 +24,7 @@ use crate::time::Instant;
 
 /// Types, more than a segment has; beyond this the oldest one is removed.
 pub(crate) const MOST_TYPES: usize = 64;
-/// Memory of all descriptions. Beyond this further ones are asked for each time.
+/// Memory of all descriptions. Beyond this further ones are read each time.
 pub(crate) const MOST_BYTES: usize = 1 << 20;
 /// Object with the software version.
 const SOFTWARE_VERSION: u16 = 0x100A;
@@ -112,7 +112,7 @@ pub struct ObjectDictionary {
 }
 
 impl ObjectDictionary {
-    /// Indices of all objects, asked of the SubDevice.
+    /// Indices of all objects, read from the SubDevice.
     ///
     /// # Errors
     /// The mailbox fails, or the SubDevice refuses.
@@ -151,10 +151,10 @@ impl ObjectDictionary {
         if let Some(answer) = known.as_ref().and_then(|known| known.borrow().entry(address)) {
             return answer.ok_or(InformationError::Refused(AbortCode::SUB_INDEX_DOES_NOT_EXIST));
         }
-        let asked = information::entry(&self.mailbox, address, ALL, limits).await;
+        let answer = information::entry(&self.mailbox, address, ALL, limits).await;
         if let Some(known) = known {
             let mut kept = self.kept.borrow_mut();
-            match &asked {
+            match &answer {
                 Ok(entry) => {
                     kept.add(&known, bytes_of_entry(entry), |known| known.keep_entry(entry.clone()));
                 }
@@ -165,7 +165,7 @@ impl ObjectDictionary {
                 Err(_) => {}
             }
         }
-        asked
+        answer
     }
 
     /// Reads what is not known yet of the type of the SubDevice.
@@ -217,7 +217,7 @@ impl ObjectDictionary {
             !is_compared && kept.all.iter().any(|known| known.borrow().is_of(&identity))
         };
         if is_open {
-            // Without a list the description itself is asked for.
+            // Without a list the description itself is read.
             let _ = self.list(limits).await;
         }
         Ok(self.compared())

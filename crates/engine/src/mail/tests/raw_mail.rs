@@ -45,7 +45,7 @@ fn mail_of_any_type_is_exchanged_refused_and_received_unsolicited() {
     }
     assert_eq!(bench.unsolicited(Unsolicited::Other), []);
     // Unsolicited mail, and an answer without a waiting request.
-    bench.device.queue_mail(own, b"news", bench.now);
+    bench.device.queue_mail(own, b"note", bench.now);
     bench.device.queue_mail(Protocol::Other(12), b"more", bench.now);
     let mailbox = bench.mailbox.clone();
     let sent = bench.run(async move { raw::send(&mailbox, Lane::of(OWN), b"echo", LIMITS.request).await });
@@ -54,7 +54,7 @@ fn mail_of_any_type_is_exchanged_refused_and_received_unsolicited() {
     bench.mailbox.mail_available();
     bench.pass(Duration::from_millis(5));
     let more = (Protocol::Other(12), b"more".to_vec());
-    assert_eq!(bench.unsolicited(Unsolicited::Other), [(own, b"news".to_vec()), more, (own, b"echo".to_vec())]);
+    assert_eq!(bench.unsolicited(Unsolicited::Other), [(own, b"note".to_vec()), more, (own, b"echo".to_vec())]);
     // Another type is not an answer.
     bench.device.queue_mail(Protocol::Other(12), b"more", bench.now);
     assert_eq!(bench.exchange(OWN, &[0]), Err(MailboxError::NoAnswer { limit: LIMITS.answer }));

@@ -109,7 +109,7 @@ fn refusals_name_the_subdevice_and_register_nothing() {
     assert_eq!(error(domain, 9, 0x6000), RegisterError::NoSuchSubDevice { subdevice: SubDeviceId(9) });
     assert_eq!(
         error(domain, 1, 0x6000).to_string(),
-        "declaration 1: the scan has not found it, and its PDOs are not declared with their entries"
+        "SubDevice 1: the scan has not found it, and its PDOs are not declared with their entries"
     );
     assert_eq!(refused.image_bytes(domain), 0);
     let at = |refused: &mut Declaration, place| refused.register_entry_at(domain, SubDeviceId(0), place, None);

@@ -58,7 +58,7 @@ impl<W: Fn(u8) -> bool> Requested<W> {
     }
 
     /// Whether it contains messages that are not acknowledged.
-    pub async fn has_news(&self, sub_index: u8) -> bool {
+    pub async fn has_new_message(&self, sub_index: u8) -> bool {
         let new_available = SdoAddress::new(DiagnosisHistory::INDEX, DiagnosisHistory::NEW_AVAILABLE);
         self.value(sub_index, new_available).await.is_some_and(|flag| flag != 0)
     }

@@ -237,7 +237,7 @@ async fn diagnosis(seen: &Seen, shared: &Shared, segment: &SharedSegment, index:
     let (registers, counted) = bus.both(registers(bus, station), statistics::read(bus, kept, index, station)).await;
     let registers = registers.unwrap_or_default();
     let requested = Requested::of(segment, index, |sub_index| wanted.is_none_or(|wanted| wanted == sub_index));
-    let has_news = requested.has_news(19).await;
+    let has_new_message = requested.has_new_message(19).await;
     let counted = counted.ok().or_else(|| kept.find(index)).unwrap_or_default();
     let access = segment.view();
     let Some(member) = access.member(index) else { return Vec::new() };
@@ -264,7 +264,7 @@ async fn diagnosis(seen: &Seen, shared: &Shared, segment: &SharedSegment, index:
         u32_(16, member.incidents.state_changes),
         u8_(17, u8::from(registers.dl_control[1] != 0)),
         u32_(18, segment.mailbox(index).map_or(0, |mailbox| mailbox.last_protocol_error())),
-        u8_(19, u8::from(has_news)),
+        u8_(19, u8::from(has_new_message)),
     ]);
     values
 }

@@ -1,11 +1,10 @@
 //! Reads the object dictionaries of SubDevices without a declaration, while no application is active.
 
-use alloc::vec::Vec;
 use core::time::Duration;
 
 use crate::mail::Limits;
 use crate::procedures::shared_segment::{SharedSegment, until_active};
-use crate::segment::{Segment, SubDeviceKey};
+use crate::segment::{Segment, SubDeviceKey, UndeclaredObservation};
 use crate::supervisor::Bus;
 
 /// Time from the beginning until dictionaries are read: requests for a segment that has just come are first.
@@ -17,15 +16,10 @@ const LIMITS: Limits = Limits::new(Duration::from_millis(100), Duration::from_se
 pub(in crate::procedures) async fn read_dictionaries(bus: Bus, segment: SharedSegment) {
     until_active(&segment, async {
         bus.sleep(QUIET).await;
-        let mut read: Vec<(SubDeviceKey, u32)> = Vec::new();
         loop {
-            let next = segment.until(|model| model.dictionary_to_read(&read)).await;
-            complete(&segment, next.0).await;
-            let is_there = |model: &Segment, (key, attempt): (SubDeviceKey, u32)| {
-                model.upkeep(key).is_some_and(|upkeep| upkeep.is_reached(attempt))
-            };
-            read.retain(|it| is_there(&segment.view(), *it));
-            read.push(next);
+            let (key, attempt) = segment.until(Segment::dictionary_to_read).await;
+            complete(&segment, key).await;
+            segment.observe_undeclared(UndeclaredObservation::DictionaryRead { key, attempt });
         }
     })
     .await;

@@ -131,14 +131,13 @@ impl Segment {
         })
     }
 
-    /// The next SubDevice, with its attempt, whose object dictionary is to be read: in a state with mail, and not among
-    /// those that were.
-    pub fn dictionary_to_read(&self, read: &[(SubDeviceKey, u32)]) -> Option<(SubDeviceKey, u32)> {
+    /// The next SubDevice, with its attempt, whose object dictionary is to be read: in a state with mail, once for each
+    /// time that it has reached its state.
+    pub fn dictionary_to_read(&self) -> Option<(SubDeviceKey, u32)> {
         self.subdevices.unassigned().find_map(|it| {
             let upkeep = it.unassigned.upkeep.as_ref().filter(|upkeep| has_mail(upkeep.target))?;
             let has_one = it.knowledge.info().is_some_and(|info| info.coe.sdo_information());
-            let due = (it.key, upkeep.reached()?);
-            (has_one && !read.contains(&due)).then_some(due)
+            Some((it.key, upkeep.dictionary_due()?)).filter(|_| has_one)
         })
     }
 

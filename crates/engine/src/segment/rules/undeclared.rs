@@ -108,6 +108,10 @@ impl Segment {
                 self.end_attempt((key, attempt), failure, now, effects);
             }
             UndeclaredObservation::Pdos { key, finding } => self.observe_undeclared_pdos(key, finding, effects),
+            UndeclaredObservation::DictionaryRead { key, attempt } => {
+                let upkeep = self.subdevices.unassigned_mut(key).and_then(|(_, it)| it.upkeep.as_mut());
+                upkeep.into_iter().for_each(|upkeep| upkeep.end_dictionary(attempt));
+            }
             UndeclaredObservation::StatesRead(read) => self.observe_states(read, now, effects),
             UndeclaredObservation::Forced(key) => self.leave(key),
         }

@@ -71,6 +71,13 @@ pub enum UndeclaredObservation<'a> {
         /// The finding.
         finding: PdoFinding<'a>,
     },
+    /// The object dictionary of one was read, or cannot be.
+    DictionaryRead {
+        /// The SubDevice.
+        key: SubDeviceKey,
+        /// The attempt after which it was requested.
+        attempt: u32,
+    },
     /// States were read.
     StatesRead(&'a [StateRead]),
     /// The application forces a state of one, which then is left as it is.

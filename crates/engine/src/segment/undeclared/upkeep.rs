@@ -62,6 +62,8 @@ pub struct Upkeep {
     pub attempt: u32,
     /// Whether the PDOs in its dictionary are to be read.
     pub reading: PdoReading,
+    /// The last attempt after which its object dictionary was read.
+    dictionary_of: Option<u32>,
     /// Consecutive failed attempts.
     failures: u32,
 }
@@ -90,6 +92,7 @@ impl Upkeep {
             progress,
             attempt: 0,
             reading: PdoReading::Open,
+            dictionary_of: None,
             failures: 0,
         }
     }
@@ -97,7 +100,8 @@ impl Upkeep {
     /// Another process has brought it this far. A first refusal may be due to a request of that process: it is
     /// followed by another attempt, and only the next one by PREOP.
     pub(in crate::segment) fn handed_over(target: AlState, progress: UpkeepProgress) -> Upkeep {
-        Upkeep { target, before: target, progress, attempt: 0, reading: PdoReading::Open, failures: 0 }
+        let kept = Upkeep::due(Instant::default());
+        Upkeep { target, before: target, progress, ..kept }
     }
 
     /// Whether it is in its requested state, or left as it is.
@@ -123,6 +127,16 @@ impl Upkeep {
     /// The attempt that has reached its state, which is still requested.
     pub(in crate::segment) fn reached(&self) -> Option<u32> {
         Some(self.attempt).filter(|attempt| self.is_reached(*attempt))
+    }
+
+    /// The attempt that has reached its state, if the object dictionary was not read since.
+    pub(in crate::segment) fn dictionary_due(&self) -> Option<u32> {
+        self.reached().filter(|attempt| self.dictionary_of != Some(*attempt))
+    }
+
+    /// The object dictionary was read, or cannot be, after this attempt.
+    pub(in crate::segment) fn end_dictionary(&mut self, attempt: u32) {
+        self.dictionary_of = Some(attempt);
     }
 
     /// Begins another attempt. Returns its number.

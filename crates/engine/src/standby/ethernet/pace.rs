@@ -115,7 +115,7 @@ impl Pace {
         self.sent_at = Some(now);
         self.blocked_since = None;
         if room >= self.owed {
-            // The answer says whether there is another one.
+            // The answer shows whether there is another one.
             self.owed = 0;
         }
     }

@@ -29,7 +29,7 @@ impl PartnerEthernet {
 
     /// Whether frames wait since it was determined last what is due. Cheap.
     #[inline]
-    pub fn has_news(&self) -> bool {
+    pub fn has_frames(&self) -> bool {
         self.pace.is_active && !self.pace.had_frames && !self.outgoing.is_empty()
     }
 

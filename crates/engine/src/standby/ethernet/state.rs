@@ -32,7 +32,7 @@ pub(crate) struct PartnerEthernet {
     pub(super) figures: Arc<Figures>,
     /// Stream and number of the last Ethernet frame that was taken.
     pub(super) taken: Option<(u32, u32)>,
-    /// When the other MainDevice was heard last.
+    /// When a frame of the other MainDevice came last.
     pub(super) sign_at: Option<Instant>,
     /// When an Ethernet frame has left or arrived last.
     pub(super) traffic_at: Option<Instant>,
@@ -43,7 +43,7 @@ pub(crate) struct PartnerEthernet {
 }
 
 impl PartnerEthernet {
-    /// With at most so many master frames per cycle, and its end for the application.
+    /// With at most this number of master frames per cycle, and its endpoint for the application.
     pub fn new(identity: Identity, most: u8, now: Instant) -> (PartnerEthernet, PartnerEndpoint) {
         let (producer, outgoing) = frame_queue(ETHERNET_QUEUE as u32);
         let (incoming, consumer) = frame_queue(ETHERNET_QUEUE as u32);
@@ -119,7 +119,7 @@ impl PartnerEthernet {
         }
     }
 
-    /// The other MainDevice was heard.
+    /// A frame of the other MainDevice has come.
     pub(super) fn note_sign(&mut self, now: Instant) {
         self.sign_at = Some(now);
         if !self.figures.is_up.load(Ordering::Relaxed) {

@@ -2,6 +2,7 @@
 
 use std::panic::resume_unwind;
 use std::sync::{Arc, MutexGuard};
+use std::time::Duration;
 
 use ringcat_engine::link::Link;
 use ringcat_engine::time::Instant;
@@ -12,6 +13,9 @@ use ringcat_wire::frame::MacAddress;
 use super::state::{Guard, Program, Shared, State, Turn};
 use crate::links::{Links, PerLink};
 use crate::simulated_addresses::{MAIN, REDUNDANT, SECOND_MAIN, SECOND_REDUNDANT};
+
+/// How long a program takes to send a frame.
+const SEND_TIME: Duration = Duration::from_micros(1);
 
 /// Ends the thread of a program that is killed.
 pub(super) struct Killed;
@@ -88,15 +92,12 @@ impl Links for HostLinks {
         if slot.is_killed {
             return;
         }
-        let (takes, has_left) = (slot.send_time, slot.guard != Guard::HasActed);
-        if has_left {
+        if slot.guard != Guard::HasActed {
             network.send(self.host.links()[link.index()], frame);
         }
-        let until = network.now() + takes;
+        let until = network.now() + SEND_TIME;
         drop(state);
-        if !takes.is_zero() {
-            self.pause(Program::Sleeps(until));
-        }
+        self.pause(Program::Sleeps(until));
     }
 
     fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool {

@@ -67,8 +67,6 @@ pub(super) struct Slot {
     pub ended_at: SimTime,
     pub guard: Guard,
     pub turn_around: TurnArounds,
-    /// Time that sending a frame takes.
-    pub send_time: Duration,
     pub arrived: VecDeque<(Link, Received)>,
     /// Frames that found no room.
     pub overruns: u64,
@@ -101,7 +99,6 @@ impl Shared {
             ended_at: SimTime::ZERO,
             guard: Guard::None,
             turn_around: TurnArounds::new(TurnAround::default(), seed ^ (host as u64 + 1)),
-            send_time: Duration::from_micros(1),
             arrived: VecDeque::with_capacity(RING),
             overruns: 0,
             panic: None,

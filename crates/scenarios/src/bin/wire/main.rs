@@ -8,7 +8,7 @@
 //!
 //! `wire` takes about a minute, `wire --full` several: more blocks, all programs at all sizes. `RINGCAT_PYTHON` names a
 //! Python with pysoem, `RINGCAT_SPINNING_RECV` a library that makes its receive spin, `RINGCAT_ETHERCRAB` the client of
-//! ethercrab (`ci/bench-wire` arranges all three); without them their rows are missing, and the table says so.
+//! ethercrab (`ci/bench-wire` arranges all three); without them their rows are missing, and the table states this.
 
 mod back_to_back;
 mod bench;

@@ -12,7 +12,7 @@ use super::*;
 const READ: Duration = Duration::from_secs(4);
 const SERVO: Position = Position(1);
 
-/// All that a SubDevice tells of its objects.
+/// All descriptions of the objects of a SubDevice.
 type Described = Vec<(Object, Vec<Option<ObjectEntry>>)>;
 
 fn begin(devices: Vec<DeviceDescription>, in_background: bool) -> MainDevice<Tap> {
@@ -60,7 +60,7 @@ fn servo_with(name: &str, object: &str, version: &str) -> DeviceDescription {
 
 // covers: states, sdo-information
 #[test]
-fn descriptions_of_a_type_are_asked_once_for_all_its_subdevices() {
+fn descriptions_of_a_type_are_read_once_for_all_its_subdevices() {
     let mut main_device = begin(servos(), false);
     let (first, described) = cost(&mut main_device, SERVO);
     assert!(first > 50, "nothing was known: {first}");
@@ -139,7 +139,7 @@ fn firmware_with_another_version_has_its_descriptions_read_again() {
 /// Objects of a modular SubDevice depend on its modules.
 // covers: states, sdo-information
 #[test]
-fn objects_of_a_modular_subdevice_are_asked_each_time() {
+fn objects_of_a_modular_subdevice_are_read_each_time() {
     let mut device = describe("servo", "modular");
     device.objects.push(SimulatedObject::variable(0xF050, "Detected modules", 7, Access::ReadOnly, &[0; 4]));
     let mut main_device = begin(vec![device.clone(), device], true);

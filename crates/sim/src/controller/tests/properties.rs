@@ -2,6 +2,7 @@
 
 use super::*;
 use proptest::prelude::*;
+use ringcat_wire::command::Addressing;
 
 /// Any frame: noise, or EtherCAT with datagrams that often address existing registers.
 fn frames() -> impl Strategy<Value = Vec<u8>> {
@@ -40,7 +41,7 @@ fn fixed_part(frame: &SimFrame) -> Vec<u8> {
     for place in &frame.datagrams {
         let header = usize::from(place.header);
         let command = Command::from_code(bytes[header]);
-        if command.counts_adp() {
+        if matches!(command.addressing(), Addressing::AutoIncrement | Addressing::Broadcast) {
             bytes[header + 2..header + 4].fill(0);
         }
         bytes[header + 7] |= 0x40;

@@ -138,6 +138,19 @@ fn an_active_without_links_becomes_inactive() {
     assert_eq!(duo.first.standby_events(), [lost]);
 }
 
+// covers: MR-25, standby
+#[test]
+fn an_active_without_links_stays_active_where_it_does_not_yield() {
+    let mut duo = duo();
+    duo.first.exchange.standby.0.as_mut().expect("it is one of two").yields_without_links = false;
+    (0..3).for_each(|_| duo.cycle());
+    duo.drain();
+    duo.first.board.live.post_carriers([Some(false); 2]);
+    duo.first.exchange.begin_role(duo.now);
+    assert!(duo.first.is_active());
+    assert_eq!(duo.first.standby_events(), []);
+}
+
 // covers: MR-08, 9.10, standby
 #[test]
 fn an_inactive_never_takes_over_by_itself() {
@@ -147,5 +160,5 @@ fn an_inactive_never_takes_over_by_itself() {
         duo.now += PERIOD;
         assert_eq!(duo.second.exchange.begin_role(duo.now), None);
     }
-    assert!(!duo.second.is_active() && duo.second.exchange.heard_at().is_some_and(|at| at < duo.now));
+    assert!(!duo.second.is_active() && duo.second.exchange.partner_data_at().is_some_and(|at| at < duo.now));
 }

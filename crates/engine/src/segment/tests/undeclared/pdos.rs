@@ -1,6 +1,6 @@
 //! PDOs in the dictionaries: when they are read, and what replaces what was known.
 
-use ringcat_wire::sii::{MailboxLayout, MailboxProtocols, SiiSyncManager, SyncManagerKind};
+use ringcat_wire::sii::{CoeDetails, MailboxLayout, MailboxProtocols, SiiSyncManager, SyncManagerKind};
 
 use super::*;
 use crate::config::{PdoAssignment, PdoMapping};
@@ -120,6 +120,35 @@ fn pdos_are_awaited_of_those_on_their_way_to_a_state_with_mail_only() {
         idle.pdos(key, PdoFinding::Held(&held(0x1A00)));
         assert!(!idle.segment.are_pdos_awaited(), "{state:?}, known");
     }
+}
+
+/// The object dictionary, without PDOs of its own: for requests that come later.
+#[test]
+fn an_object_dictionary_is_read_once_for_each_time_that_the_state_is_reached() {
+    let mut idle = with_dictionary(PdoSource::Dictionary);
+    idle.segment.observe(Observation::ScanBegun, idle.now);
+    let mut scan = found(&THREE);
+    let info = &mut scan.subdevices[1];
+    info.mailbox = Some(MailboxLayout::default());
+    info.protocols = MailboxProtocols(MailboxProtocols::COE);
+    info.coe = CoeDetails(CoeDetails::SDO | CoeDetails::SDO_INFORMATION);
+    idle.segment.observe(Observation::ScanEnded(Ok(scan)), idle.now);
+    assert_eq!(idle.segment.dictionary_to_read(), None, "no state is reached");
+    keep(&mut idle);
+    let key = idle.key(1);
+    assert_eq!(idle.segment.dictionary_to_read(), Some((key, 1)));
+    let read = |idle: &mut Idle, attempt| idle.seen(UndeclaredObservation::DictionaryRead { key, attempt });
+    assert_eq!(read(&mut idle, 1), []);
+    assert_eq!(idle.segment.dictionary_to_read(), None);
+    let next = attempts(&idle.request(1, PREOP))[0];
+    assert_eq!(idle.segment.dictionary_to_read(), None, "on its way");
+    idle.end(next, None);
+    assert_eq!(idle.segment.dictionary_to_read(), Some((key, 2)));
+    read(&mut idle, 1);
+    assert_eq!(idle.segment.dictionary_to_read(), Some((key, 2)), "that of the attempt before");
+    let boot = attempts(&idle.request(1, AlState::Boot))[0];
+    idle.end(boot, None);
+    assert_eq!(idle.segment.dictionary_to_read(), None, "BOOT has no mail");
 }
 
 #[test]

@@ -12,7 +12,7 @@ use crate::output::{say, write_event};
 use crate::run_log::name_of;
 
 /// The events so far.
-pub struct News {
+pub struct EventReport {
     begin: Instant,
     log: EventLog,
     /// Names of the SubDevices, when they are known.
@@ -25,11 +25,11 @@ pub struct News {
     pub difference: Option<String>,
 }
 
-impl News {
+impl EventReport {
     /// From this time on.
-    pub fn new(begin: Instant) -> News {
+    pub fn new(begin: Instant) -> EventReport {
         let (log, seen) = (EventLog::new(begin, Names::default()), Takeover::default());
-        News { begin, log, names: Arc::default(), seen, refused: None, difference: None }
+        EventReport { begin, log, names: Arc::default(), seen, refused: None, difference: None }
     }
 
     /// Prints the events since the last call.
@@ -116,14 +116,14 @@ mod tests {
     // covers: standby, REQ010
     #[test]
     fn a_takeover_in_op_holds_and_one_through_init_or_a_difference_does_not() {
-        let mut news = News::new(Instant(0));
+        let mut events = EventReport::new(Instant(0));
         let took_over =
             |is_hot| StandbyEvent::TookOver { silence: Some(Duration::ZERO), in_state: 3, is_hot, cut: None };
-        news.count(&took_over(true));
-        assert_eq!((news.seen.takeovers, news.reasons().len()), (1, 0));
-        news.count(&took_over(false));
-        news.count(&StandbyEvent::ConfigurationDiffers { item: None, what: "SubDevice 3".to_owned() });
+        events.count(&took_over(true));
+        assert_eq!((events.seen.takeovers, events.reasons().len()), (1, 0));
+        events.count(&took_over(false));
+        events.count(&StandbyEvent::ConfigurationDiffers { item: None, what: "SubDevice 3".to_owned() });
         let expected = ["takeovers through INIT: 1", "the other MainDevice differs: SubDevice 3"];
-        assert_eq!(news.reasons(), expected);
+        assert_eq!(events.reasons(), expected);
     }
 }

@@ -1,22 +1,22 @@
-//! A conversation of both MainDevices of [`Two`] in Ethernet frames.
+//! Ethernet frames between both MainDevices of [`Two`].
 
 use super::Two;
-use crate::talk::Speaker;
+use crate::ethernet_peer::EthernetPeer;
 
 /// Both sides.
 #[derive(Debug)]
-pub struct Talk {
+pub struct EthernetTraffic {
     /// By controller.
-    pub sides: [Speaker; 2],
+    pub sides: [EthernetPeer; 2],
     starts: u16,
     /// Frames per step of each side.
     frames: usize,
 }
 
-impl Talk {
-    /// Of so many frames per step in each direction.
-    pub fn new(frames: usize) -> Talk {
-        Talk { sides: [Speaker::new(0, 0), Speaker::new(1, 0)], starts: 0, frames }
+impl EthernetTraffic {
+    /// Of this number of frames per step in each direction.
+    pub fn new(frames: usize) -> EthernetTraffic {
+        EthernetTraffic { sides: [EthernetPeer::new(0, 0), EthernetPeer::new(1, 0)], starts: 0, frames }
     }
 
     /// Both sides take what has arrived, and send.
@@ -24,10 +24,10 @@ impl Talk {
     /// # Panics
     /// A frame is damaged, comes twice, or comes behind a later one.
     pub fn step(&mut self, two: &mut Two) {
-        self.listen(two);
+        self.receive(two);
         for (side, controller) in self.sides.iter_mut().zip(&mut two.controllers) {
             if let Some(endpoint) = controller.endpoint.as_mut().filter(|_| !controller.is_dead) {
-                side.say(endpoint, self.frames);
+                side.send(endpoint, self.frames);
             }
         }
     }
@@ -35,11 +35,11 @@ impl Talk {
     /// Both sides take what has arrived.
     ///
     /// # Panics
-    /// As [`Talk::step`].
-    pub fn listen(&mut self, two: &mut Two) {
+    /// As [`EthernetTraffic::step`].
+    pub fn receive(&mut self, two: &mut Two) {
         for (side, controller) in self.sides.iter_mut().zip(&mut two.controllers) {
             if let Some(endpoint) = &mut controller.endpoint {
-                side.listen(endpoint);
+                side.receive(endpoint);
             }
             assert_eq!(side.fault, None, "{side:?}");
         }
@@ -48,7 +48,7 @@ impl Talk {
     /// The program of a side was started again.
     pub fn begin_anew(&mut self, number: usize) {
         self.starts += 1;
-        self.sides[number] = Speaker::new(number as u8, self.starts);
+        self.sides[number] = EthernetPeer::new(number as u8, self.starts);
     }
 
     /// Frames of each side that have not arrived at the other one.

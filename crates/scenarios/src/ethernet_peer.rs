@@ -8,7 +8,7 @@ const HEAD: usize = 14;
 
 /// What one side has sent and received.
 #[derive(Clone, Debug, Default)]
-pub struct Speaker {
+pub struct EthernetPeer {
     sender: u8,
     /// Number of the start of its program.
     start: u16,
@@ -27,14 +27,14 @@ pub struct Speaker {
     pub fault: Option<String>,
 }
 
-impl Speaker {
+impl EthernetPeer {
     /// Of one of both sides, and the start of its program.
-    pub fn new(sender: u8, start: u16) -> Speaker {
-        Speaker { sender, start, ..Speaker::default() }
+    pub fn new(sender: u8, start: u16) -> EthernetPeer {
+        EthernetPeer { sender, start, ..EthernetPeer::default() }
     }
 
     /// Sends frames.
-    pub fn say(&mut self, endpoint: &mut PartnerEndpoint, frames: usize) {
+    pub fn send(&mut self, endpoint: &mut PartnerEndpoint, frames: usize) {
         for _ in 0..frames {
             // All lengths in turn, and more often those that a poll has room for in any case.
             self.length = (self.length + 37) % (MAX_ETHERNET - HEAD + 1);
@@ -47,7 +47,7 @@ impl Speaker {
     }
 
     /// Takes the frames that have arrived.
-    pub fn listen(&mut self, endpoint: &mut PartnerEndpoint) {
+    pub fn receive(&mut self, endpoint: &mut PartnerEndpoint) {
         let mut room = [0; MAX_ETHERNET];
         while let Some(length) = endpoint.receive(&mut room) {
             let fault = self.take(&room[..length]).err();
