@@ -5,7 +5,7 @@
 pub mod al_state;
 mod assign_pdos;
 mod attempt_results;
-mod cabling;
+pub(crate) mod cabling;
 pub mod clocks;
 pub(crate) mod command_watch;
 pub(crate) mod complete_siis;

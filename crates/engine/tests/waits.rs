@@ -86,15 +86,16 @@ const WAITS: [(&str, &[Reason]); 42] = [
 ];
 
 /// By file, each wait for an event with a limit (`Bus::within`), in its order. In a loop the limit is a period.
-const WITHIN: [(&str, &[Reason]); 19] = [
+const WITHIN: [(&str, &[Reason]); 20] = [
     ("mail/conversation.rs", &[Limit, Limit, Limit]),
     ("mail/mailbox.rs", &[Limit]),
     ("mail/reader.rs", &[Register]),
     ("mail/relay/gateway_queue.rs", &[Limit]),
+    ("procedures/cabling.rs", &[Limit]),
     ("procedures/clocks/drift.rs", &[Limit]),
     ("procedures/clocks/signals.rs", &[Limit, Limit, Limit]),
     ("procedures/complete_siis.rs", &[Limit]),
-    ("procedures/deactivate.rs", &[Limit, Limit, Limit]),
+    ("procedures/deactivate.rs", &[Limit, Limit, Limit, Limit]),
     ("procedures/dictionary.rs", &[Limit]),
     ("procedures/idle/rescue.rs", &[Limit]),
     // What has been read so far is used in each pause.

@@ -313,7 +313,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// Runs the last cycles before a stop, if they are allowed, with all outputs zero if `outputs` requests it.
     /// Afterwards only the acyclic half uses the wire.
     pub(crate) fn end_cycles(&mut self, outputs: LastOutputs, are_allowed: bool) {
-        self.cyclic.set_trigger(Trigger::Time);
+        self.cyclic.begin_last();
         for _ in 0..if are_allowed { LAST_CYCLES } else { 0 } {
             self.cycle(|data| {
                 if outputs == LastOutputs::Zero {

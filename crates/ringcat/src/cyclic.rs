@@ -78,6 +78,8 @@ pub(crate) struct Cyclic {
     under_way: u32,
     /// A cycle is due and waits because the acyclic half requests a pause.
     held: bool,
+    /// The last cycles wait for no pause.
+    ends: bool,
     window: Arc<Window>,
     /// Number of disturbances that the cyclic status includes.
     published: u64,
@@ -118,10 +120,17 @@ impl Cyclic {
             cycle: 0,
             under_way: active.under_way.into(),
             held: false,
+            ends: false,
             window,
             published: 0,
             of_two: OfTwo::default(),
         }
+    }
+
+    /// The last cycles begin: they follow the time, and no measurement holds them back.
+    pub fn begin_last(&mut self) {
+        self.set_trigger(Trigger::Time);
+        self.ends = true;
     }
 
     pub fn set_trigger(&mut self, trigger: Trigger) {
@@ -180,7 +189,7 @@ impl Cyclic {
     #[inline(always)]
     fn is_held_back(&mut self, now: Instant) -> bool {
         let pause_until = self.exchange.pause_until();
-        let is_paused = now < pause_until;
+        let is_paused = now < pause_until && !self.ends;
         if is_paused {
             self.held = true;
             self.window.expect_cycle(pause_until);
@@ -191,7 +200,7 @@ impl Cyclic {
     /// Time of the next check whether a cycle begins, unless a frame arrives before.
     #[inline(always)]
     pub fn wake(&self, now: Instant) -> Instant {
-        if now < self.exchange.pause_until() {
+        if now < self.exchange.pause_until() && !self.ends {
             // A pause may end earlier than requested.
             return now + PAUSE_LOOK;
         }

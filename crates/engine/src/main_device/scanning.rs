@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 use super::MainDevice;
 use super::activate_error::ActivateError;
 use crate::info::{SiiExtent, SubDeviceInfo};
+use crate::procedures::cabling::until_link_returns;
 use crate::procedures::loops::restore;
 use crate::procedures::scan::{Scan, ScanError, ScanOptions, end_scan, scan, unless_another};
 use crate::role::Function;
@@ -50,6 +51,7 @@ impl MainDevice {
         self.supervisor.spawn(async move {
             let scanned = unless_another(&segment, number, async {
                 restore(&bus, &segment).await;
+                until_link_returns(&bus, &segment).await;
                 scan(&bus, &segment, &options).await
             });
             if let Some(result) = scanned.await {

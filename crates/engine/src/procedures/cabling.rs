@@ -25,7 +25,7 @@ use crate::event::Notice;
 use crate::link::{Link, LinkSet};
 use crate::ring::RingState;
 use crate::segment::disturbance::Disturbance;
-use crate::segment::{Crossing, LineCheck, Observation, PORT_BITS, SubDevice, is_swapped, retrace};
+use crate::segment::{Crossing, LineCheck, LinkObservation, Observation, PORT_BITS, SubDevice, is_swapped, retrace};
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{Closing, Finding, NodeStatus, rings_shown, with_longer_rings};
 
@@ -38,6 +38,8 @@ const PAUSE: Duration = Duration::from_millis(10);
 /// Limit until both ends of a link have detected that it went down or up, and frames have shown it. Interfaces need
 /// seconds to establish a link.
 const LINK_LIMIT: Duration = Duration::from_secs(5);
+/// The same for frames on a link with a carrier, if the ring may have been broken meanwhile.
+const FRAME_LIMIT: Duration = Duration::from_millis(200);
 /// Interval of the check for it.
 const LINK_PAUSE: Duration = Duration::from_millis(1);
 
@@ -90,20 +92,39 @@ pub(super) async fn cabling(
     if !in_control {
         return scan_until_confirmed(bus, known, reported).await;
     }
-    wait_for(bus, known, RingState::Open).await;
+    wait_for(bus, known, RingState::Open, LINK_LIMIT).await;
     let found = scan_until_confirmed(bus, known, reported).await;
     known.segment().force_disconnect(Link::Redundant, false).await;
-    wait_for(bus, known, RingState::Closed).await;
-    // A carrier that is still missing would be reported as lost. The links are polled less often than frames arrive.
+    wait_for(bus, known, RingState::Closed, LINK_LIMIT).await;
+    until_carriers(bus).await;
+    known.segment().observe(Observation::Link(LinkObservation::Connected));
+    found
+}
+
+/// Waits for a link that a procedure which was ended has taken down: a scan would find the ring open.
+pub(crate) async fn until_link_returns(bus: &Bus, segment: &SharedSegment) {
+    if !segment.view().is_link_returning() {
+        return;
+    }
+    let is_up = segment.until(|model| (!model.is_link_down()).then_some(()));
+    if bus.within(LINK_LIMIT, is_up).await.is_ok() {
+        until_carriers(bus).await;
+        wait_for(bus, segment, RingState::Closed, FRAME_LIMIT).await;
+    }
+    segment.observe(Observation::Link(LinkObservation::Connected));
+}
+
+/// Waits until no link is without a carrier, which would be reported as lost. The links are polled less often than
+/// frames arrive.
+async fn until_carriers(bus: &Bus) {
     let (until, signal) = (bus.now() + LINK_LIMIT, bus.signal());
     while bus.carriers().contains(&Some(false)) && bus.now() < until {
         bus.until_posted(bus.posted(), until, &signal, || false).await;
     }
-    found
 }
 
-async fn wait_for(bus: &Bus, known: &impl Known, state: RingState) {
-    let until = bus.now() + LINK_LIMIT;
+async fn wait_for(bus: &Bus, known: &impl Known, state: RingState, limit: Duration) {
+    let until = bus.now() + limit;
     while bus.ring() != state && bus.now() < until && !known.is_outranked() {
         bus.sleep(LINK_PAUSE).await;
         // Before activation no other frame shows it.

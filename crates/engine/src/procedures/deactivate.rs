@@ -62,8 +62,9 @@ pub(crate) async fn deactivate(
     let until = bus.now() + limit;
     let Remainder { to_stop, known } = remainder;
     let declared = to_stop.clone();
-    // A SubDevice that does not leave its state must not take the time of the others.
-    let stopped = stop(bus, to_stop, AlState::PreOp, limit / 2).await;
+    // Neither a SubDevice that does not leave its state nor lost frames must take the time of the others.
+    let stopping = stop(bus, to_stop, AlState::PreOp, limit / 2);
+    let stopped = bus.within(limit * 3 / 4, stopping).await.unwrap_or(Err(StopError::NoAnswer));
     // A scan that loses frames must not take longer.
     let scanning = scan_until(bus, segment, options, &known, until);
     let _ = bus.within(until.since(bus.now()), scanning).await;

@@ -23,7 +23,7 @@ use crate::segment::clocks::{ClockFinding, ClockObservation, ClockVersions};
 use crate::segment::disturbance::{Disturbance, Wanted};
 use crate::segment::effect::{Effect, Task};
 use crate::segment::{
-    Addressed, IdleObservation, LinkObservation, MemberFinding, Observation, PdoFinding, Segment,
+    Addressed, IdleObservation, LinkObservation, MemberFinding, Observation, PdoFinding, Segment, SubDeviceKey,
     UndeclaredObservation, Words,
 };
 use crate::supervisor::{Bus, Posted, Signal};
@@ -135,6 +135,7 @@ impl SharedSegment {
     /// Passes an observation to the model, and executes its effects.
     pub fn observe(&self, seen: Observation<'_>) {
         let effects = self.segment.borrow_mut().observe(seen, self.bus.now());
+        let mut written = Vec::new();
         for effect in effects.0 {
             match effect {
                 Effect::Report(event) => self.bus.report(event),
@@ -143,11 +144,12 @@ impl SharedSegment {
                 Effect::MainCount(count) => self.bus.set_main_count(count),
                 Effect::Occupants(occupants) => self.bus.set_occupants(occupants),
                 Effect::OrderLink(order) => self.bus.order_link(order),
-                Effect::Mailboxes(now) => self.undeclared.follow(&now),
+                Effect::Mailboxes(now) => written.extend(self.undeclared.follow(&now)),
                 Effect::Start(task) => self.tasks.borrow_mut().push_back(task),
             }
         }
         self.changed.notify();
+        self.observe_outdated(written);
     }
 
     /// Passes a finding of an attempt to bring up a member to the model.
@@ -199,7 +201,11 @@ impl SharedSegment {
 
     /// The same for those without a declaration.
     pub(super) fn observe_undeclared_pdos(&self) {
-        for key in self.undeclared.take_written_pdos() {
+        self.observe_outdated(self.undeclared.take_written_pdos());
+    }
+
+    fn observe_outdated(&self, written: Vec<SubDeviceKey>) {
+        for key in written {
             self.observe_undeclared(UndeclaredObservation::Pdos { key, finding: PdoFinding::Outdated });
         }
     }

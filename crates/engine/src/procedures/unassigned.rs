@@ -174,8 +174,12 @@ async fn find_places(bus: &Bus, segment: &SharedSegment) -> Option<Vec<(StationA
 
 /// Makes an unassigned SubDevice the member that it is, unless its address cannot be written now.
 async fn admit(bus: &Bus, segment: &SharedSegment, key: SubDeviceKey, (index, attempt): (usize, u32)) {
-    let fitted = segment.view().as_member(key, index);
-    let info = match fitted {
+    // Mail that has changed its PDOs counts: its mailbox closes.
+    let known = || {
+        segment.observe_undeclared_pdos();
+        segment.view().as_member(key, index)
+    };
+    let info = match known() {
         Some(Ok(info)) => info,
         Some(Err(reason)) => return segment.observe(Observation::Misfit { key, index, attempt, reason }),
         None => return,
@@ -185,5 +189,6 @@ async fn admit(bus: &Bus, segment: &SharedSegment, key: SubDeviceKey, (index, at
     if written.is_err() && bus.fprd(info.station, map::STATION_ADDRESS, 2).await.is_err() {
         return;
     }
+    let info = known().and_then(Result::ok).unwrap_or(info);
     segment.observe(Observation::Admitted { key, index, attempt, info: Box::new(info) });
 }

@@ -18,6 +18,8 @@ pub enum LinkObservation {
     Answered(bool),
     /// Its procedure has the answer, or no longer waits for it.
     Ended,
+    /// The link that was disconnected is up again, or is no longer waited for.
+    Connected,
 }
 
 /// Progress of the last order.
@@ -39,6 +41,8 @@ pub(super) struct LinkControl {
     order: Option<(LinkOrder, Progress)>,
     /// The link that is down by an order.
     disconnected: Option<Link>,
+    /// A link was disconnected by an order, and is not known to be up again.
+    returns: bool,
 }
 
 impl LinkControl {
@@ -50,12 +54,23 @@ impl LinkControl {
         }
     }
 
+    /// Whether a link is down by an order, or comes up again after one.
+    pub fn is_returning(&self) -> bool {
+        self.returns
+    }
+
+    /// Whether a link is down by an order.
+    pub fn is_down(&self) -> bool {
+        self.disconnected.is_some()
+    }
+
     /// Observes the course of an order.
     pub fn observe(&mut self, seen: LinkObservation, effects: &mut Effects) {
         match (seen, self.order) {
             (LinkObservation::Ordered(order), _) => self.give(order, effects),
             (LinkObservation::Fetched, Some((order, Progress::Given))) => {
                 self.disconnected = order.disconnect.then_some(order.link);
+                self.returns |= order.disconnect;
                 self.order = Some((order, Progress::Fetched));
             }
             (LinkObservation::Answered(is_done), Some((order, Progress::Fetched))) => {
@@ -75,16 +90,19 @@ impl LinkControl {
                 self.order = Some((order, Progress::Abandoned));
             }
             (LinkObservation::Ended, Some((_, Progress::Answered(_)))) => self.order = None,
+            (LinkObservation::Connected, _) => self.returns = false,
             (LinkObservation::Ended, Some((_, Progress::Abandoned)) | None)
             | (LinkObservation::Fetched | LinkObservation::Answered(_), _) => {}
         }
     }
 
-    /// The procedure that would reconnect the link has ended.
+    /// The procedure that would reconnect the link has ended. An order that was not fetched is taken back.
     pub fn restore(&mut self, effects: &mut Effects) {
-        self.order = None;
-        if let Some(link) = self.disconnected {
-            self.give(LinkOrder { link, disconnect: false }, effects);
+        let is_given = matches!(self.order.take(), Some((_, Progress::Given)));
+        match self.disconnected {
+            Some(link) => self.give(LinkOrder { link, disconnect: false }, effects),
+            None if is_given => effects.0.push(Effect::OrderLink(None)),
+            None => {}
         }
     }
 
@@ -95,7 +113,7 @@ impl LinkControl {
 
     fn note_refusal(&mut self, order: LinkOrder, is_done: bool) {
         if order.disconnect && !is_done {
-            self.disconnected = None;
+            (self.disconnected, self.returns) = (None, false);
         }
     }
 }
@@ -105,7 +123,7 @@ mod tests {
     use alloc::vec;
     use alloc::vec::Vec;
 
-    use super::LinkObservation::{Answered, Ended, Fetched, Ordered};
+    use super::LinkObservation::{Answered, Connected, Ended, Fetched, Ordered};
     use super::*;
 
     const DOWN: LinkOrder = LinkOrder { link: Link::Redundant, disconnect: true };
@@ -135,19 +153,19 @@ mod tests {
 
     #[test]
     fn a_link_that_is_down_at_the_end_is_reconnected_and_no_other() {
-        for (seen, is_down) in [
-            (&[][..], false),
-            (&[Ordered(DOWN)], false),
-            (&[Ordered(DOWN), Fetched], true),
-            (&[Ordered(DOWN), Fetched, Answered(true)], true),
-            (&[Ordered(DOWN), Fetched, Answered(true), Ended], true),
-            (&[Ordered(DOWN), Fetched, Answered(false)], false),
-            (&[Ordered(DOWN), Fetched, Answered(true), Ended, Ordered(UP)], true),
-            (&[Ordered(DOWN), Fetched, Answered(true), Ended, Ordered(UP), Fetched], false),
+        for (seen, at_end) in [
+            (&[][..], vec![]),
+            (&[Ordered(DOWN)], vec![None]),
+            (&[Ordered(DOWN), Fetched], vec![Some(UP)]),
+            (&[Ordered(DOWN), Fetched, Answered(true)], vec![Some(UP)]),
+            (&[Ordered(DOWN), Fetched, Answered(true), Ended], vec![Some(UP)]),
+            (&[Ordered(DOWN), Fetched, Answered(false)], vec![]),
+            (&[Ordered(DOWN), Fetched, Answered(true), Ended, Ordered(UP)], vec![Some(UP)]),
+            (&[Ordered(DOWN), Fetched, Answered(true), Ended, Ordered(UP), Fetched], vec![]),
         ] {
             let mut control = LinkControl::default();
             orders(&mut control, seen);
-            assert_eq!(at_the_end(control), if is_down { vec![Some(UP)] } else { vec![] }, "{seen:?}");
+            assert_eq!(at_the_end(control), at_end, "{seen:?}");
         }
     }
 
@@ -157,6 +175,22 @@ mod tests {
         orders(&mut control, &[Ordered(DOWN), Fetched, Answered(true), Ended]);
         control.restore(&mut Effects::default());
         assert_eq!(at_the_end(control), [Some(UP)]);
+    }
+
+    #[test]
+    fn a_link_returns_from_the_order_to_disconnect_it_until_it_is_up() {
+        for (seen, returns) in [
+            (&[Ordered(DOWN)][..], false),
+            (&[Ordered(DOWN), Fetched], true),
+            (&[Ordered(DOWN), Fetched, Answered(false)], false),
+            (&[Ordered(DOWN), Fetched, Answered(true), Ended, Ordered(UP), Fetched, Answered(true), Ended], true),
+            (&[Ordered(DOWN), Fetched, Answered(true), Ended, Ordered(UP), Fetched, Connected], false),
+        ] {
+            let mut control = LinkControl::default();
+            orders(&mut control, seen);
+            control.restore(&mut Effects::default());
+            assert_eq!(control.is_returning(), returns, "{seen:?}");
+        }
     }
 
     #[test]

@@ -290,6 +290,16 @@ impl Segment {
         self.link_control.answer()
     }
 
+    /// Whether a link was disconnected on purpose, and is not known to be up again.
+    pub fn is_link_returning(&self) -> bool {
+        self.link_control.is_returning()
+    }
+
+    /// Whether a link is disconnected on purpose.
+    pub fn is_link_down(&self) -> bool {
+        self.link_control.is_down()
+    }
+
     /// Whether the disturbance with this number is under way.
     pub fn is_granted(&self, number: u32) -> bool {
         self.slot.is_granted(number)

@@ -7,7 +7,7 @@ use ringcat::{
     Application, ClockConfig, Declaration, DomainId, Error, Event, LastOutputs, MainDevice, Options, Position, Retries,
     Scan, Services, StopError, SubDeviceConfig, SubDeviceId, SubDeviceState, automatic,
 };
-use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
@@ -285,6 +285,32 @@ fn declarations_with_other_pdos_follow_each_other_without_idle_operation() {
                 main_device = application.deactivate(LastOutputs::Zero, LIMIT).expect("all follow");
                 assert_eq!(statuses(&mut main_device), [PREOP; MIXED.len()], "{chosen:?}");
             }
+        }
+    }
+}
+
+/// One of them does not leave OP, so the others are waited for when the frames are lost.
+// covers: stop
+#[test]
+fn a_deactivation_keeps_its_limit_when_the_host_cable_is_cut_during_it() {
+    const SHORT: Duration = Duration::from_millis(100);
+    for after in (0..100).step_by(3).map(Duration::from_millis) {
+        for network in networks() {
+            let (main_device, scan) = scanned(network, &Options::default());
+            let mut application = activate(main_device, declare(&scan, &[0, 1, 2, 3, 4, 5], false));
+            settle(&mut application);
+            let network = application.links_mut().network_mut();
+            network.apply(Fault::Hang(DeviceIndex(0), true));
+            let (at, last) = (network.now() + after, network.cables().len() - 1);
+            [0, last].into_iter().for_each(|cable| network.schedule(at, Fault::Cut(CableId(cable))));
+            let begun = application.now();
+            let mut ended = match application.deactivate(LastOutputs::Held, SHORT) {
+                Ok(_) => panic!("it has not left OP"),
+                Err(refused) => refused.main_device,
+            };
+            let took = ended.now().since(begun);
+            assert!(took <= SHORT + 4 * CYCLE, "cut after {after:?}: {took:?}");
+            assert!(ended.links_mut().network().device(DeviceIndex(0)).al_status().state != PREOP.state);
         }
     }
 }

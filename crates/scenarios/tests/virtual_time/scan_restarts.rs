@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use ringcat::shared_segment::SharedSegment;
 use ringcat::{JunctionMode, MainDevice, Options, Position, SupervisorThread};
-use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::cable::{DeviceIndex, HostLink};
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::al::{AlState, AlStatus};
 use ringcat_wire::register::map;
@@ -78,6 +78,33 @@ fn a_requested_scan_begins_anew_at_every_moment() {
         }
         assert!(ended > 20, "scans were ended: {ended}");
     }
+}
+
+/// Interfaces take long to establish a link: a scan meanwhile would find the ring open.
+// covers: scan, crossed-enhanced
+#[test]
+fn a_scan_waits_for_the_link_that_the_ended_one_has_taken_down() {
+    let mut were_down = 0;
+    for step in 0..40 {
+        let network = NetworkOptions::default().with_detection_delay(Duration::from_millis(200));
+        let mut main_device = MainDevice::request(Tap::new(ring(descriptions(&KINDS), network)), &options(false));
+        main_device.engine_mut().restart_scan().expect("none is under way");
+        let end = main_device.now() + Duration::from_secs(1);
+        while main_device.links_mut().network().carrier(HostLink::Redundant) && main_device.now() < end {
+            work(&mut main_device, Duration::from_micros(200));
+        }
+        work(&mut main_device, Duration::from_millis(10 * step));
+        if main_device.engine().scan_result().is_some() {
+            continue;
+        }
+        were_down += u32::from(!main_device.links_mut().network().carrier(HostLink::Redundant));
+        let scan = main_device.restart_scan().expect("it ends");
+        assert!(main_device.links_mut().network().carrier(HostLink::Redundant), "step {step}");
+        let last = scan.subdevices[KINDS.len() - 1].dl_status.ports[1].communication;
+        assert!(last, "step {step}: the ring is found open");
+        assert_whole(&mut main_device, "restarted");
+    }
+    assert!(were_down > 5, "the link was down: {were_down}");
 }
 
 // covers: scan, states

@@ -44,8 +44,9 @@ impl UndeclaredMailboxes {
         UndeclaredMailboxes::new(bus, self.rings.clone())
     }
 
-    /// The SubDevices with mailboxes from now on. Mailboxes of those that stay do not change, the others are closed.
-    pub(crate) fn follow(&self, now: &[(SubDeviceKey, Position)]) {
+    /// The SubDevices with mailboxes from now on. Mailboxes of those that stay do not change, the others are closed:
+    /// returned are those of them with downloads to objects of PDO assignment or mapping that were not taken.
+    pub(crate) fn follow(&self, now: &[(SubDeviceKey, Position)]) -> Vec<SubDeviceKey> {
         let (mut all, mut rings) = (self.all.borrow_mut(), self.rings.borrow_mut());
         let is_same =
             |(entry, (key, at)): &(&Entry, &(SubDeviceKey, Position))| entry.key == *key && entry.position == *at;
@@ -69,6 +70,7 @@ impl UndeclaredMailboxes {
             all.push(entry);
         }
         before.iter().for_each(|entry| entry.mailbox.close());
+        before.iter().filter(|entry| entry.mailbox.has_written_pdos()).map(|entry| entry.key).collect()
     }
 
     /// The mailbox of a SubDevice.

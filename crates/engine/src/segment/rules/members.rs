@@ -400,6 +400,7 @@ impl Segment {
             Ok(setup) => {
                 member.take_setup(index, setup, effects);
                 self.subdevices.identify(index, info.clone());
+                self.tell_scan_of_member(index);
             }
             // The same error as before.
             Err(_) if member.unfit.is_some() => {}

@@ -40,32 +40,52 @@ impl Segment {
                 }
             }
         }
-        if info != *before {
-            self.replace_info(&before, info);
+        let now = if info == *before { before.clone() } else { Rc::new(info) };
+        self.subdevices.replace(&before, &now);
+        self.tell_scan(&before, &now);
+    }
+
+    /// What is known now of the PDOs of a SubDevice counts in the last scan, too. Where the list and the last scan share
+    /// their data they do so afterwards.
+    fn tell_scan(&mut self, before: &Rc<SubDeviceInfo>, now: &Rc<SubDeviceInfo>) {
+        let Some(scanned) = self.stage.scanned_mut() else { return };
+        let is_it = |it: &Rc<SubDeviceInfo>| it.station == now.station && it.identity == now.identity;
+        let Some(at) = scanned.found.subdevices.iter().position(is_it) else { return };
+        let known = &scanned.found.subdevices[at];
+        let known = if Rc::ptr_eq(known, before) {
+            now.clone()
+        } else if (known.pdo_source, &known.pdos) != (now.pdo_source, &now.pdos) {
+            Rc::new(SubDeviceInfo { pdos: now.pdos.clone(), pdo_source: now.pdo_source, ..(**known).clone() })
+        } else {
+            return;
+        };
+        Rc::make_mut(&mut scanned.found).subdevices[at] = known;
+    }
+
+    /// The same for a member whose data was replaced by other data.
+    pub(in crate::segment) fn tell_scan_of_member(&mut self, index: usize) {
+        if let Some(info) = self.member(index).and_then(|member| member.info).cloned() {
+            self.tell_scan(&info, &info);
         }
     }
 
-    /// More is known of a SubDevice. Where the list and the last scan share their data they do so afterwards, too.
-    fn replace_info(&mut self, before: &Rc<SubDeviceInfo>, info: SubDeviceInfo) {
-        let now = Rc::new(info);
-        self.subdevices.replace(before, &now);
+    /// A SubDevice that has left the list has got mail that has changed its PDOs. It may come back with its station
+    /// address, and with what the last scan knows of it.
+    fn doubt_scanned(&mut self, station: StationAddress) {
         let Some(scanned) = self.stage.scanned_mut() else { return };
-        let is_it = |it: &&mut Rc<SubDeviceInfo>| it.station == now.station && it.identity == now.identity;
+        let is_it = |it: &&mut Rc<SubDeviceInfo>| it.station == station;
         if let Some(known) = Rc::make_mut(&mut scanned.found).subdevices.iter_mut().find(is_it) {
-            if Rc::ptr_eq(known, before) {
-                known.clone_from(&now);
-            } else {
-                let (pdos, pdo_source) = (now.pdos.clone(), now.pdo_source);
-                *known = Rc::new(SubDeviceInfo { pdos, pdo_source, ..(**known).clone() });
-            }
+            Rc::make_mut(known).pdo_source = PdoSource::Outdated;
         }
     }
 
     /// A scan began with what was known then: what was written or read of a dictionary since then counts in what it
     /// found, too.
     pub(in crate::segment) fn take_newer_pdos(&self, found: &mut Rc<Found>) {
+        let scanned = self.stage.scanned().map(|it| it.found.subdevices.as_slice()).unwrap_or_default();
         let newer_of = |info: &SubDeviceInfo| {
-            let known = self.subdevices.at(info.station)?.knowledge.info()?;
+            let listed = self.subdevices.at(info.station).and_then(|it| it.knowledge.info());
+            let known = listed.or_else(|| scanned.iter().find(|known| known.station == info.station))?;
             let is_newer = known.pdo_source != PdoSource::Sii
                 && (known.pdo_source, &known.pdos) != (info.pdo_source, &info.pdos)
                 && known.identity == info.identity;
@@ -89,7 +109,12 @@ impl Segment {
         finding: PdoFinding<'_>,
         effects: &mut Effects,
     ) {
-        let Some((_, it)) = self.subdevices.unassigned_mut(key) else { return };
+        let Some((_, it)) = self.subdevices.unassigned_mut(key) else {
+            if matches!(finding, PdoFinding::Outdated) {
+                self.doubt_scanned(key.station);
+            }
+            return;
+        };
         if let Some(upkeep) = &mut it.upkeep {
             upkeep.reading = match finding {
                 PdoFinding::Outdated | PdoFinding::Held(_) => PdoReading::Open,

@@ -190,6 +190,7 @@ impl Segment {
         member.take_setup(index, setup, effects);
         member.configured = false;
         self.subdevices.identify(index, info);
+        self.tell_scan_of_member(index);
         self.subdevices.remove(|other| other == key);
         effects.report(Event::Returned { subdevice: SubDeviceId(index) });
         // Its state was not set by this session.

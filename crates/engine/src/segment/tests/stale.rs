@@ -4,7 +4,7 @@ use alloc::string::String;
 
 use ringcat_wire::sii::Identity;
 
-use crate::info::SiiExtent;
+use crate::info::{PdoSource, SiiExtent};
 use crate::ring::FrameLimit;
 use crate::segment::unassigned::UnassignedView;
 use crate::segment::view::View;
@@ -182,6 +182,26 @@ fn an_unassigned_subdevice_that_has_left_is_not_admitted() {
     let key = SubDeviceKey { station: TEMPORARY, since };
     let effects = ring.observe(Observation::Admitted { key, index: 0, attempt, info });
     assert_eq!((effects, ring.member(0).phase), (Vec::new(), Phase::Absent));
+}
+
+/// It was out of reach: another program may have written its dictionary.
+#[test]
+fn pdos_of_an_admitted_or_read_member_are_in_doubt_in_the_last_scan_too() {
+    let in_doubt = SubDeviceInfo { pdo_source: PdoSource::Outdated, ..info(0, station(0)) };
+    let sources = |ring: &Ring| {
+        let found = ring.segment.found().unwrap().subdevices[0].pdo_source;
+        (ring.member(0).info.unwrap().pdo_source, found)
+    };
+    let mut ring = Ring::closed(3);
+    lose(&mut ring);
+    let attempt = ring.member(0).attempt;
+    let key = SubDeviceKey { station: TEMPORARY, since: give(&mut ring) };
+    let info = Box::new(in_doubt.clone());
+    ring.observe(Observation::Admitted { key, index: 0, attempt, info });
+    assert_eq!(sources(&ring), (PdoSource::Outdated, PdoSource::Outdated), "admitted");
+    let mut ring = Ring::closed(3);
+    ring.observe(of_member((0, 0), MemberFinding::ReadAgain(&in_doubt)));
+    assert_eq!(sources(&ring), (PdoSource::Outdated, PdoSource::Outdated), "read again");
 }
 
 #[test]

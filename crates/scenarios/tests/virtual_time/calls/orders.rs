@@ -273,3 +273,27 @@ fn a_failed_subdevice_that_restarts_unseen_is_found_and_brought_to_preop() {
         assert_idle(&mut ecrt, "it came back by itself");
     }
 }
+
+/// A measurement of delays whose frames are lost asks for pauses; the last cycles do not wait for them.
+// covers: api, stop, dc
+#[test]
+fn a_deactivation_keeps_its_limit_while_a_measurement_loses_its_frames() {
+    for at in 0..120 {
+        for mut ecrt in networks(5).map(Ecrt::new) {
+            ecrt.request().expect("it is free");
+            let (domain, _) = configure(&mut ecrt, 0..5);
+            ecrt.with_clocks();
+            ecrt.activate().expect("it fits");
+            for _ in 0..at {
+                ecrt.receive();
+                ecrt.process(domain);
+                ecrt.queue(domain);
+                ecrt.send();
+                ecrt.pause(Duration::from_micros(150));
+            }
+            ecrt.network().cut(CableId(0));
+            // Asserts its limit.
+            let _ = ecrt.deactivate();
+        }
+    }
+}

@@ -104,6 +104,27 @@ fn a_dictionary_that_cannot_be_read_is_tried_again_with_the_next_attempt() {
     assert_eq!(idle.segment.found().unwrap().subdevices[1].pdo_source, PdoSource::Outdated);
 }
 
+/// It may come back with its station address, and with what the last scan knows of it.
+#[test]
+fn mail_that_wrote_pdos_of_a_subdevice_that_has_left_counts_in_the_last_scan() {
+    let source = |idle: &Idle| idle.segment.found().unwrap().subdevices[1].pdo_source;
+    for leaves_during_scan in [false, true] {
+        let mut idle = with_dictionary(PdoSource::Dictionary);
+        keep(&mut idle);
+        let key = idle.key(1);
+        let begun = idle.segment.found().unwrap().clone();
+        idle.segment.observe(Observation::Readdressing(&[key.station]), idle.now);
+        assert_eq!(idle.pdos(key, PdoFinding::Outdated), []);
+        assert_eq!(source(&idle), PdoSource::Outdated);
+        if leaves_during_scan {
+            // A scan that began before has what was known then.
+            let versions = idle.segment.versions();
+            idle.observe(Observation::FoundAgain { versions, found: begun });
+            assert_eq!((source(&idle), idle.known()[0].0), (PdoSource::Outdated, PdoSource::Outdated));
+        }
+    }
+}
+
 /// A program that waits for the PDOs does not wait for a SubDevice whose state has no mail.
 #[test]
 fn pdos_are_awaited_of_those_on_their_way_to_a_state_with_mail_only() {
