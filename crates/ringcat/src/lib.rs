@@ -103,8 +103,11 @@ mod of_two;
 mod of_two;
 mod options;
 mod pace;
+// Further pages of docs, for their tests.
 #[cfg(feature = "packet")]
 pub mod packet;
+#[cfg(doctest)]
+mod pages;
 mod parts;
 #[cfg(feature = "packet")]
 pub mod piped;

@@ -50,9 +50,11 @@ pub(super) fn declared(
     mailboxes(eni, index, &mut found)?;
     let mut list = Vec::with_capacity(found.len());
     for (mut one, place) in found {
-        if one.area().is_some_and(|area| area.length > 0) {
-            one.pdos = pdos(index, &one, process_data, place, notices);
-        }
+        one.pdos = match one.area() {
+            None => Vec::new(),
+            Some(area) if area.length == 0 => empty_pdos(&one, process_data),
+            Some(_) => pdos(index, &one, process_data, place, notices),
+        };
         list.push(one);
     }
     list.sort_by_key(|one| one.index);
@@ -169,6 +171,14 @@ fn pdos(
     let mapping =
         |pdo: &crate::eni::Pdo| PdoMapping::of(pdo.index, pdo.entries.iter().flat_map(entries).collect::<Vec<_>>());
     described.into_iter().map(mapping).collect()
+}
+
+/// The PDOs of a disabled SyncManager: those without entries are assigned, though nothing is exchanged.
+fn empty_pdos(one: &DeclaredSyncManager, process_data: &ProcessData) -> Vec<PdoMapping> {
+    let described = mapped(one, process_data).unwrap_or_default();
+    let are_empty = described.iter().all(|pdo| pdo.entries.is_empty());
+    let of = |pdo: &crate::eni::Pdo| PdoMapping::of(pdo.index, []);
+    described.into_iter().filter(|_| are_empty).map(of).collect()
 }
 
 /// An entry, split if it is longer than an object dictionary allows (`ARRAY [0..99] OF BYTE`).

@@ -5,7 +5,7 @@ mod pdos;
 
 use std::collections::BTreeSet;
 
-use ringcat_engine::config::{DeclaredSyncManager, ReferenceClock, SyncManagerRole};
+use ringcat_engine::config::{DeclaredArea, DeclaredSyncManager, ReferenceClock, SyncManagerRole};
 use ringcat_engine::declared::SubDeviceId;
 use ringcat_engine::info::Direction;
 use ringcat_engine::main_device::{Declaration, DomainMember};
@@ -19,6 +19,9 @@ use crate::export::{Export, ExportDetails, ExportError, ExportOptions, LeftOut, 
 /// Control bytes of mailboxes (protocol 3.11).
 const MAILBOX_OUT: u8 = 0x26;
 const MAILBOX_IN: u8 = 0x22;
+/// Those of process data: three buffers, event to the PDI for outputs.
+const OUTPUTS: u8 = 0x24;
+const INPUTS: u8 = 0x20;
 /// Watchdog enable in the control byte.
 const WATCHDOG: u8 = 0x40;
 
@@ -116,14 +119,19 @@ fn declared(
         if found.iter().any(|other| other.index == it.number) {
             return Err(refused("a mailbox uses it"));
         }
-        let Some(length) = length(it).ok_or_else(|| {
-            refused("the entries of its PDOs are those of the EEPROM: an ENI has to state them (`ringcat init` does)")
-        })?
-        else {
+        // The file says nothing of its process data.
+        if it.pdo.is_empty() && it.length == Some(0) {
             continue;
-        };
-        let (Some(start), Some(control)) = (it.start, it.control) else {
-            return Err(refused("an ENI needs its `start` and `control` (`ringcat init` writes them)"));
+        }
+        let length = length(it).ok_or_else(|| {
+            refused("the entries of its PDOs are those of the EEPROM: an ENI has to state them (`ringcat init` does)")
+        })?;
+        let (start, control) = match length {
+            0 => (it.start.unwrap_or_default(), control_while_disabled(it)),
+            _ => it
+                .start
+                .zip(it.control)
+                .ok_or_else(|| refused("an ENI needs its `start` and `control` (`ringcat init` writes them)"))?,
         };
         let control = match it.watchdog {
             None => control,
@@ -135,22 +143,36 @@ fn declared(
             model::Direction::Inputs => SyncManagerRole::Inputs,
         };
         let pdos = it.pdo.iter().map(|pdo| super::declare::mapping(pdo).with_fixed(false)).collect();
-        let one = buffer(it.number, role, Buffer { start, length }, control);
-        found.push(one.with_op_only(it.op_only).with_pdos(pdos));
+        let mut one = buffer(it.number, role, Buffer { start, length }, control);
+        one.register.activate.enable = length > 0;
+        found.push(one.with_op_only(it.op_only && length > 0).with_pdos(pdos));
     }
     found.sort_by_key(|it| it.index);
     Ok(found)
 }
 
-/// Bytes of a SyncManager: `Some(None)` if it is disabled, `None` if they are not known.
-fn length(of: &SyncManager) -> Option<Option<u16>> {
+/// The process data of a SyncManager; `None` if it has none.
+fn exchanged(of: &DeclaredSyncManager) -> Option<DeclaredArea> {
+    of.area().filter(|area| area.length > 0)
+}
+
+/// Bytes of a SyncManager; 0 if it is disabled, `None` if they are not known.
+fn length(of: &SyncManager) -> Option<u16> {
     let mut bits = 0_u32;
     for pdo in &of.pdo {
         bits += pdo.entries.as_ref()?.iter().map(|entry| u32::from(entry.bits)).sum::<u32>();
     }
-    let of_pdos = u16::try_from(bits.div_ceil(8)).unwrap_or(u16::MAX);
-    let length = of.length.unwrap_or(of_pdos);
-    Some((length > 0).then_some(length))
+    Some(of.length.unwrap_or_else(|| u16::try_from(bits.div_ceil(8)).unwrap_or(u16::MAX)))
+}
+
+/// A disabled SyncManager has no memory, so its control byte does not matter; a register of zeros would be one that was
+/// cleared.
+fn control_while_disabled(of: &SyncManager) -> u8 {
+    let is_cleared = |control: &u8| control & !WATCHDOG == 0;
+    of.control.filter(|control| !is_cleared(control)).unwrap_or(match of.direction {
+        model::Direction::Outputs => OUTPUTS,
+        model::Direction::Inputs => INPUTS,
+    })
 }
 
 fn buffer(index: u8, role: SyncManagerRole, of: Buffer, control: u8) -> DeclaredSyncManager {
@@ -176,7 +198,7 @@ fn bootstrap(of: &SubDevice) -> Option<[DeclaredSyncManager; 2]> {
 fn places(configuration: &mut Configuration) {
     let Configuration { declaration, image, .. } = configuration;
     for (subdevice, config) in declaration.subdevices.iter().enumerate() {
-        for area in config.declared.iter().flatten().filter_map(DeclaredSyncManager::area) {
+        for area in config.declared.iter().flatten().filter_map(exchanged) {
             let number = Some(area.sync_manager);
             if image.areas.iter().any(|it| it.subdevice == subdevice && it.sync_manager == number) {
                 continue;
@@ -199,7 +221,7 @@ fn places(configuration: &mut Configuration) {
 fn domains(file: &NetworkFile, declaration: &mut Declaration, left_out: &mut Vec<LeftOut>) -> Vec<String> {
     let of = |at: usize| -> BTreeSet<u8> {
         let declared = declaration.subdevices[at].declared.iter().flatten();
-        declared.filter_map(DeclaredSyncManager::area).map(|area| area.sync_manager).collect()
+        declared.filter_map(exchanged).map(|area| area.sync_manager).collect()
     };
     let mut names = Vec::new();
     let mut kept = Vec::new();

@@ -166,9 +166,9 @@ fn the_mapping_of_a_fixed_pdo_is_not_written() {
     let (file, _) = network(&text(" Fixed=\"1\""), ANALOG);
     let fixed: Vec<(u16, bool)> = file.subdevice[0].sync_manager[1].pdo.iter().map(|it| (it.index, it.fixed)).collect();
     assert_eq!(fixed, [(0x1A00, true), (0x1A02, true)]);
-    assert_eq!(exported(&file), [0x1C13, 0x8000]);
+    assert_eq!(exported(&file), [0x1C12, 0x1C13, 0x1C12, 0x1C13, 0x8000]);
     let (file, _) = network(&text(""), ANALOG);
-    assert_eq!(exported(&file), [0x1C13, 0x1A02, 0x1C13, 0x8000]);
+    assert_eq!(exported(&file), [0x1C12, 0x1C13, 0x1A02, 0x1C12, 0x1C13, 0x8000]);
 }
 
 /// As EC-Engineer writes them: a PDO that passes from one SyncManager to another is in neither meanwhile.

@@ -1,6 +1,7 @@
 //! ENIs that are written (protocol 8): from other ENIs, from network files, with whatever texts they hold.
 
 mod commands;
+mod empty_pdos;
 mod networks;
 mod refusals;
 mod revisions;

@@ -53,7 +53,7 @@ fn commands(startup: &[StartupCommand], of: &SubDevice) -> Vec<StartupCommand> {
     let assigned: Vec<(u16, &SyncManager)> = of
         .sync_manager
         .iter()
-        .filter(|it| !it.pdo.is_empty())
+        .filter(|it| !it.pdo.is_empty() || it.length.is_none())
         .map(|it| (ASSIGNMENT_BASE + u16::from(it.number), it))
         .collect();
     let clear = |(object, _): &(u16, &SyncManager)| download(*object, 0, [0], format!("clear sm pdos ({object:#06x})"));

@@ -1,0 +1,10 @@
+//! Pages of `docs` besides the guide: their examples are compiled, and run where they need no interface.
+
+#[doc = include_str!("../pages/eni.md")]
+mod eni {}
+
+#[doc = include_str!("../pages/network-file.md")]
+mod network_file {}
+
+#[doc = include_str!("../pages/standby.md")]
+mod standby {}
