@@ -59,9 +59,9 @@ impl Lookout {
         *self = Lookout::new(now);
     }
 
-    /// This MainDevice is INACTIVE. `heard_at`: when the ACTIVE was there last, if it was.
-    pub fn note(&mut self, heard_at: Option<Instant>, limit: Duration, now: Instant) -> Option<Notice> {
-        self.there_at = self.there_at.max(heard_at.unwrap_or_default());
+    /// This MainDevice is INACTIVE. `seen_at`: when the ACTIVE was there last, if it was.
+    pub fn note(&mut self, seen_at: Option<Instant>, limit: Duration, now: Instant) -> Option<Notice> {
+        self.there_at = self.there_at.max(seen_at.unwrap_or_default());
         let silence = now.since(self.there_at);
         let (alarm, notice) = match self.alarm {
             Alarm::Quiet if silence >= limit => (Alarm::Raised, Notice::NoActive(silence)),

@@ -166,7 +166,7 @@ impl Watch {
             return None;
         }
         let limit = self.time_out * if self.policy.takes_over { 3 } else { 1 };
-        self.lookout.note(situation.heard_at.or(situation.heard_any_at), limit, now)
+        self.lookout.note(situation.partner_data_at.or(situation.partner_frame_at), limit, now)
     }
 
     /// What is requested in the cycle that begins now.
