@@ -286,12 +286,12 @@ impl Master {
                 return Err(Code::INVALID);
             }
         };
-        application.exchange_mut().set_clock_datagrams(ClockDatagrams::Called);
+        application.set_clock_datagrams(ClockDatagrams::Called);
         let now = application.now();
         if let Some(given_at) = locked(&self.given_at).take() {
             let passed = u64::try_from(given_at.elapsed().as_nanos()).unwrap_or(u64::MAX);
             let time = self.application_time.load(Ordering::Relaxed).wrapping_add(passed);
-            application.exchange_mut().set_application_time(time, now);
+            application.set_application_time(time, now);
         }
         self.follow_live_status(bus);
         let begun = Active::new(application, self.has_clock.load(Ordering::Relaxed), bus.ownership());
@@ -331,7 +331,7 @@ impl Master {
         let mut draft = locked(&self.draft);
         for (number, words) in draft.domains().iter().enumerate() {
             words.set_memory(std::ptr::null_mut());
-            locked(&self.memory).extend(application.exchange_mut().give_memory_back(DomainId(number)));
+            locked(&self.memory).extend(application.give_memory_back(DomainId(number)));
         }
         let ended = match application.deactivate(LastOutputs::Zero, limit) {
             Ok(ended) => ended,
@@ -449,7 +449,7 @@ impl Master {
         }
         self.cycle(|Active { application, .. }| {
             let now = application.now();
-            application.exchange_mut().set_application_time(time, now);
+            application.set_application_time(time, now);
         })
     }
 

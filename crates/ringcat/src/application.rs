@@ -396,14 +396,9 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.links.now()
     }
 
-    /// The cyclic half, for functions without a method here.
+    /// The cyclic half, to read its state.
     pub fn exchange(&self) -> &Exchange {
         &self.cyclic.exchange
-    }
-
-    /// The cyclic half, for functions without a method here.
-    pub fn exchange_mut(&mut self) -> &mut Exchange {
-        &mut self.cyclic.exchange
     }
 
     /// The links.

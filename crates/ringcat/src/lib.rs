@@ -76,6 +76,7 @@ mod error;
 #[cfg(feature = "esi")]
 pub mod esi;
 pub mod event_log;
+mod exchange_access;
 pub mod foreign;
 #[cfg(feature = "gateway")]
 pub mod gateway;

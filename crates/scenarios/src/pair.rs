@@ -82,7 +82,8 @@ impl Pair {
         }
     }
 
-    /// Programs that are started from now on have Ethernet to the other one, and send this number of frames in each cycle.
+    /// Programs that are started from now on have Ethernet to the other one, and send this number of frames in each
+    /// cycle.
     pub fn let_members_send_frames(&mut self, frames: usize) {
         self.frames_per_cycle = frames;
     }

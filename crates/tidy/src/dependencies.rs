@@ -97,7 +97,7 @@ pub fn reach_the_engine(tree: &Tree) -> Vec<Finding> {
     let is_program = |path: &str| PROGRAMS.iter().any(|program| path.starts_with(program));
     for file in tree.rust().filter(|file| is_program(&file.path)) {
         for token in tokens(&file.text) {
-            if let Some(name @ ("engine" | "engine_mut" | "Engine" | "EngineKey")) = token.ident() {
+            if let Some(name @ ("engine" | "engine_mut" | "exchange_mut" | "Engine" | "EngineKey")) = token.ident() {
                 let text = format!("{name}: what a program needs of the engine is a function of the library");
                 findings.push(Finding::new(&file.path, token.line, text));
             }

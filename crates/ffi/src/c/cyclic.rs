@@ -142,7 +142,7 @@ unsafe extern "C" fn ecrt_master_sync_reference_clock(master: *mut ec_master_t) 
     let sync = |MasterObject(owner): &MasterObject| {
         with_clock(&owner.master, |active| {
             let now = active.application.now();
-            active.application.exchange_mut().sync_reference(now);
+            active.application.sync_reference(now);
         })
     };
     // SAFETY: a handle of the library (ecrt.h).
@@ -152,7 +152,7 @@ unsafe extern "C" fn ecrt_master_sync_reference_clock(master: *mut ec_master_t) 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_master_sync_reference_clock_to(master: *mut ec_master_t, sync_time: u64) -> c_int {
     let sync = |MasterObject(owner): &MasterObject| {
-        with_clock(&owner.master, |active| active.application.exchange_mut().sync_reference_to(sync_time))
+        with_clock(&owner.master, |active| active.application.sync_reference_to(sync_time))
     };
     // SAFETY: a handle of the library (ecrt.h).
     unsafe { call(master, sync) }
@@ -160,9 +160,8 @@ unsafe extern "C" fn ecrt_master_sync_reference_clock_to(master: *mut ec_master_
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_master_sync_slave_clocks(master: *mut ec_master_t) -> c_int {
-    let sync = |MasterObject(owner): &MasterObject| {
-        with_clock(&owner.master, |active| active.application.exchange_mut().sync_clocks())
-    };
+    let sync =
+        |MasterObject(owner): &MasterObject| with_clock(&owner.master, |active| active.application.sync_clocks());
     // SAFETY: a handle of the library (ecrt.h).
     unsafe { call(master, sync) }
 }
@@ -180,9 +179,8 @@ unsafe extern "C" fn ecrt_master_reference_clock_time(master: *const ec_master_t
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_master_sync_monitor_queue(master: *mut ec_master_t) -> c_int {
-    let monitor = |MasterObject(owner): &MasterObject| {
-        with_clock(&owner.master, |active| active.application.exchange_mut().monitor_clocks())
-    };
+    let monitor =
+        |MasterObject(owner): &MasterObject| with_clock(&owner.master, |active| active.application.monitor_clocks());
     // SAFETY: a handle of the library (ecrt.h).
     unsafe { call(master, monitor) }
 }
