@@ -45,8 +45,8 @@ impl Segment {
         self.tell_scan(&before, &now);
     }
 
-    /// What is known now of the PDOs of a SubDevice counts in the last scan, too. Where the list and the last scan share
-    /// their data they do so afterwards.
+    /// What is known now of the PDOs of a SubDevice counts in the last scan, too. Where the list and the last scan
+    /// share their data they do so afterwards.
     fn tell_scan(&mut self, before: &Rc<SubDeviceInfo>, now: &Rc<SubDeviceInfo>) {
         let Some(scanned) = self.stage.scanned_mut() else { return };
         let is_it = |it: &Rc<SubDeviceInfo>| it.station == now.station && it.identity == now.identity;
