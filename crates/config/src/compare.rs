@@ -23,6 +23,7 @@ use std::collections::BTreeSet;
 use ringcat_engine::config::{ConfigError, Resolution, resolve};
 use ringcat_engine::declared::SubDeviceId;
 use ringcat_engine::info::SubDeviceInfo;
+use ringcat_engine::main_device::Required;
 use ringcat_wire::address::Position;
 
 use crate::configuration::Configuration;
@@ -66,6 +67,7 @@ impl Configuration {
             let text = format!("SubDevice {config} \"{name}\" of the file: {error}");
             Difference { subdevice: Some(SubDeviceId(config)), position, kind, prevents_op, text }
         };
+        let required = self.declaration.required;
         let mut differences = Vec::new();
         // A SubDevice of another identity is reported once.
         let mut reported = BTreeSet::new();
@@ -74,11 +76,11 @@ impl Configuration {
                 Resolution::Found { .. } => {}
                 Resolution::Absent { config, error } => {
                     reported.extend(in_its_place(&error));
-                    differences.push(differs(config, false, &error));
+                    differences.push(differs(config, required == Required::All, &error));
                 }
                 Resolution::Failed { config, error } => {
                     reported.extend(in_its_place(&error));
-                    differences.push(differs(config, true, &error));
+                    differences.push(differs(config, required != Required::Nothing, &error));
                 }
                 Resolution::Extra { info } if reported.contains(&found[info].position) => {}
                 Resolution::Extra { info } => differences.push(additional(&found[info], false)),
@@ -131,10 +133,43 @@ impl Configuration {
                 Place::Additional { info } => differences.push(additional(&found[info], marks.shifts(info))),
             }
         }
+        self.settle(&marks, &order, found, &mut differences);
         if !differences.iter().any(|difference| difference.kind == DifferenceKind::Order) {
             differences.extend(cables::compare(self, &pairs, found, topology));
         }
         differences
+    }
+
+    /// An activation that fails has a difference that says so. SubDevices by alias that are missing or at other places
+    /// can shift those by position without being marked themselves.
+    fn settle(
+        &self,
+        marks: &marks::Marks,
+        order: &order::Order,
+        found: &[SubDeviceInfo],
+        differences: &mut Vec<Difference>,
+    ) {
+        let Some((config, error)) = marks.first_failing() else { return };
+        if differences.iter().any(|difference| difference.prevents_op) {
+            return;
+        }
+        let names = self.names();
+        let text = |(config, info): (usize, usize)| Some((config, found[info].position, order.text(config, &names)?));
+        if let Some((config, position, text)) = marks.shifted().find_map(text) {
+            let (subdevice, position) = (Some(SubDeviceId(config)), Some(position));
+            differences.push(Difference { subdevice, position, kind: DifferenceKind::Order, prevents_op: true, text });
+            return;
+        }
+        for of_places in [&[DifferenceKind::Order][..], &[DifferenceKind::Missing, DifferenceKind::Additional]] {
+            if differences.iter().any(|it| of_places.contains(&it.kind)) {
+                let causes = differences.iter_mut().filter(|it| of_places.contains(&it.kind));
+                causes.for_each(|it| it.prevents_op = true);
+                return;
+            }
+        }
+        let text = format!("\"{}\": {error}", names[config]);
+        let (subdevice, kind) = (Some(SubDeviceId(config)), DifferenceKind::Order);
+        differences.push(Difference { subdevice, position: in_its_place(error), kind, prevents_op: true, text });
     }
 
     fn missing(&self, config: usize, names: &[String], prevents_op: bool) -> Difference {

@@ -249,7 +249,8 @@ fn common(configs: &[usize], infos: &[usize], degree: &impl Fn(usize, usize) -> 
     pairs
 }
 
-/// The sequence with the most pairs of degree [`OWN`], then with the most pairs of the same device.
+/// The sequence with the most pairs of degree [`OWN`], then with the most pairs of the same device; of several, the one
+/// in which each is at its own place.
 fn best(configs: &[usize], infos: &[usize], degree: &impl Fn(usize, usize) -> u32) -> Vec<(usize, usize)> {
     let width = infos.len() + 1;
     let mut sums = vec![0u32; (configs.len() + 1) * width];
@@ -259,6 +260,11 @@ fn best(configs: &[usize], infos: &[usize], degree: &impl Fn(usize, usize) -> u3
             let one = sums[(row + 1) * width + column].max(sums[row * width + column + 1]);
             sums[row * width + column] = both.max(one);
         }
+    }
+    let in_place = || configs.iter().copied().zip(infos.iter().copied());
+    let degrees = in_place().map(|(config, info)| degree(config, info));
+    if configs.len() == infos.len() && degrees.sum::<u32>() == sums[0] {
+        return in_place().filter(|(config, info)| degree(*config, *info) > 0).collect();
     }
     let (mut row, mut column) = (0, 0);
     let mut pairs = Vec::new();

@@ -12,23 +12,39 @@ pub(super) struct Marks {
     /// By declaration.
     resolutions: Vec<Resolution>,
     required: Required,
-    /// The last SubDevice whose declaration fails because it is at another position than declared.
-    last_shifted: Option<usize>,
+    /// The SubDevices whose declarations fail because they are at other positions than declared: index in the file,
+    /// index in the scan.
+    shifted: Vec<(usize, usize)>,
 }
 
 impl Marks {
     pub(super) fn of(configuration: &Configuration, found: &[SubDeviceInfo], places: &[Place]) -> Marks {
         let configs = &configuration.declaration.subdevices;
         let required = configuration.declaration.required;
-        let mut marks = Marks { resolutions: resolve(configs, found), required, last_shifted: None };
+        let mut marks = Marks { resolutions: resolve(configs, found), required, shifted: Vec::new() };
         let shifted = places.iter().filter_map(|place| match *place {
             Place::Both { config, info, moved: false } => {
-                marks.is_shifted(config, &configs[config], &found[info]).then_some(info)
+                marks.is_shifted(config, &configs[config], &found[info]).then_some((config, info))
             }
             _ => None,
         });
-        marks.last_shifted = shifted.max();
+        marks.shifted = shifted.collect();
         marks
+    }
+
+    /// The first declaration with which the activation fails.
+    pub(super) fn first_failing(&self) -> Option<(usize, &ConfigError)> {
+        self.resolutions.iter().find_map(|resolution| match resolution {
+            Resolution::Failed { config, error } | Resolution::Absent { config, error } => {
+                self.fails(*config).then_some((*config, error))
+            }
+            _ => None,
+        })
+    }
+
+    /// The SubDevices whose declarations fail because of their positions, in the order of the file.
+    pub(super) fn shifted(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.shifted.iter().copied()
     }
 
     /// Whether the activation fails because of this declaration; never with nothing required.
@@ -41,24 +57,24 @@ impl Marks {
         }
     }
 
-    /// Whether a SubDevice that is missing prevents OP. With nothing required it does not: the engine finds the
-    /// SubDevices behind it by their identities.
+    /// Whether a SubDevice that is missing prevents OP: unless it is optional, and no declaration behind it is shifted.
+    /// Never where the engine finds all: then it takes another one as the absent one.
     pub(super) fn misses(&self, config: usize, declared: &SubDeviceConfig) -> bool {
-        self.fails(config) || (!declared.optional && self.required != Required::Nothing)
+        let shifts = self.shifted.iter().any(|(other, _)| *other > config);
+        self.first_failing().is_some() && (self.fails(config) || !declared.optional || shifts)
     }
 
     /// Whether an additional SubDevice takes the position of a declared one, or moves those behind it.
     pub(super) fn shifts(&self, info: usize) -> bool {
-        self.required != Required::Nothing && self.last_shifted.is_some_and(|last| info < last)
+        self.shifted.iter().any(|(_, last)| info < *last)
     }
 
     /// Whether a declaration by position fails, and not because of what its SubDevice is.
     fn is_shifted(&self, config: usize, declared: &SubDeviceConfig, info: &SubDeviceInfo) -> bool {
         let is_own = match self.resolutions.get(config) {
-            Some(Resolution::Failed { error: ConfigError::Mismatch { position, .. }, .. }) => {
-                *position == info.position
+            Some(Resolution::Failed { error, .. } | Resolution::Absent { error, .. }) if self.fails(config) => {
+                matches!(error, ConfigError::Mismatch { position, .. } if *position == info.position)
             }
-            Some(Resolution::Failed { .. }) => false,
             _ => return false,
         };
         by_position(declared) && declared.group.is_none() && !is_own

@@ -55,6 +55,19 @@ fn one_missing_or_additional_subdevice_is_one_difference() {
     assert_eq!(differences(&file_of(&[]), &bus(&[1, 2])).len(), 2);
 }
 
+/// Rows of alike devices between them could also be paired one place further.
+// covers: network-file
+#[test]
+fn two_that_have_changed_places_around_a_row_are_one_difference() {
+    for (file, found) in [
+        ([1, 2, 2, 3, 3, 2], [2, 2, 2, 3, 3, 1]),
+        ([4, 3, 2, 3, 1, 3], [3, 3, 2, 3, 1, 4]),
+        ([2, 1, 1, 1, 1, 1], [1, 1, 1, 1, 1, 2]),
+    ] {
+        assert_eq!(differences(&file_of(&bus(&file)), &bus(&found)).len(), 1, "{file:?}, {found:?}");
+    }
+}
+
 /// The order of the file is not that of the positions.
 // covers: network-file
 #[test]
