@@ -5,6 +5,7 @@
 //! leaves ([`crate::window`]). So neither half waits for the other, and supervision goes on for an application that
 //! only runs its cycles.
 
+mod half;
 mod handover;
 #[cfg(feature = "standby")]
 mod joining;
@@ -23,25 +24,18 @@ use ringcat_engine::JunctionConnection;
 use ringcat_engine::Scan;
 use ringcat_engine::domain::DomainId;
 use ringcat_engine::event::TimedEvent;
-use ringcat_engine::info::SubDeviceInfo;
-use ringcat_engine::link::Link;
-use ringcat_engine::main_device::{
-    ActivateError, Declaration, MainDevice as Engine, Pending, SubDeviceId, SubDeviceState,
-};
+use ringcat_engine::main_device::{ActivateError, Declaration, MainDevice as Engine, Pending, SubDeviceState};
 use ringcat_engine::ring_status::RingStatus;
 use ringcat_engine::time::Instant;
 #[cfg(feature = "eoe")]
 use ringcat_link::WakeUp;
 use ringcat_wire::al::AlState;
 
-use crate::acyclic::AcyclicHalf;
 use crate::application::Application;
 use crate::error::Error;
 use crate::job::{InOrder, Job, Task, job};
 use crate::links::Links;
 use crate::main_device::{Options, Refused};
-use crate::not_ready::Reason;
-use crate::subdevice::SubDeviceName;
 use crate::window::Window;
 use worker::{Attention, Published, Request, Rest, Worker};
 
@@ -408,85 +402,6 @@ impl Drop for Handle {
             // The panic handler has reported a panic of the thread.
             let _ = thread.join();
         }
-    }
-}
-
-impl AcyclicHalf for SupervisorThread {
-    const SHARES_LINKS: bool = false;
-
-    fn receive(&mut self, _link: Link, _frame: &[u8], _now: Instant) {}
-
-    #[cfg(feature = "standby")]
-    fn fill(&mut self, _link: Link, _frame: &mut [u8], _now: Instant) {}
-
-    #[cfg(feature = "standby")]
-    fn take_returned(&mut self, _frame: &[u8], _now: Instant) {}
-
-    fn work(&mut self, _links: &mut impl Links, _window: &Window) {}
-
-    fn wake(&self) -> Instant {
-        Instant::NEVER
-    }
-
-    fn due_at(&mut self, _links: &impl Links) -> Instant {
-        Instant::NEVER
-    }
-
-    fn known_due_at(&self) -> Instant {
-        Instant::NEVER
-    }
-
-    #[cfg(feature = "standby")]
-    fn report_watchdogs_below(&mut self, needed: Duration, now: Instant) {
-        // If the thread has ended there is nothing to report.
-        let _ = self.begin(move |engine, _| {
-            engine.report_watchdogs_below(needed, now);
-            Box::new(|_, _| true)
-        });
-    }
-
-    #[cfg(feature = "standby")]
-    fn watchdogs_below(&self, needed: Duration) -> Result<Vec<(SubDeviceId, Duration)>, Error> {
-        self.act(move |engine| engine.watchdogs_below(needed))
-    }
-
-    fn states(&self) -> Vec<SubDeviceState> {
-        SupervisorThread::states(self)
-    }
-
-    fn all_settled(&self) -> bool {
-        SupervisorThread::all_settled(self)
-    }
-
-    fn ring_status(&self) -> RingStatus {
-        SupervisorThread::ring_status(self)
-    }
-
-    fn pop_event(&mut self, _now: Instant) -> Option<TimedEvent> {
-        SupervisorThread::pop_event(self)
-    }
-
-    fn counters(&self) -> AcyclicCounters {
-        SupervisorThread::counters(self)
-    }
-
-    fn sample_each_second(&mut self, take: impl FnMut(Instant, AcyclicCounters) + Send + 'static) {
-        // If the thread has ended there is nothing to sample.
-        let _ = self.begin(move |engine, _| {
-            engine.sample_each_second(take);
-            Box::new(|_, _| true)
-        });
-    }
-
-    fn info(&self, subdevice: SubDeviceId) -> Option<SubDeviceInfo> {
-        self.act(move |engine| engine.info(subdevice)).ok().flatten()
-    }
-
-    fn keep_events(&mut self, _now: Instant) {}
-
-    fn not_ready(&self) -> Result<Vec<(SubDeviceName, Reason)>, Error> {
-        let failures = self.rest().failures;
-        self.act(move |engine| failures.explain(engine))
     }
 }
 

@@ -106,8 +106,8 @@ impl Joiner {
         let needed = application.longest_gap(&self.policy).unwrap_or_default().as_secs_f64() * 1e3;
         let named: Vec<String> = named.collect();
         Err(Failure::new(format!(
-            "a takeover may last {needed:.1} ms, longer than watchdogs of SubDevices: {}; a shorter --timeout or --cycle, \
-             or longer watchdogs in the file",
+            "a takeover may last {needed:.1} ms, longer than watchdogs of SubDevices: {}; a shorter --timeout or \
+             --cycle, or longer watchdogs in the file",
             named.join(", ")
         )))
     }

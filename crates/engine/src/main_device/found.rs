@@ -8,6 +8,9 @@ use super::states::SubDeviceState;
 use crate::config::SubDeviceConfig;
 use crate::declared::SubDeviceId;
 use crate::info::SubDeviceInfo;
+#[cfg(feature = "standby")]
+use crate::role::MainDeviceRole;
+use crate::segment::member::Phase;
 
 /// A declared SubDevice of the active declaration.
 #[derive(Clone, Debug)]
@@ -51,6 +54,20 @@ impl MainDevice {
     /// Number of SubDevices of the last scan; `None` before a successful scan.
     pub fn scanned_count(&self) -> Option<usize> {
         self.segment.view().found().map(|found| found.subdevices.len())
+    }
+
+    /// Whether states of SubDevices are known: an INACTIVE has them from the ACTIVE, while there is one.
+    pub(super) fn are_states_known(&self) -> bool {
+        #[cfg(feature = "standby")]
+        let is_known = self.role() == MainDeviceRole::Active || !self.segment.board.is_silent();
+        #[cfg(not(feature = "standby"))]
+        let is_known = true;
+        is_known
+    }
+
+    /// The state of a SubDevice that has this phase in the model.
+    pub(super) fn known_state(&self, phase: Phase) -> SubDeviceState {
+        if self.are_states_known() { phase.into() } else { SubDeviceState::Unknown }
     }
 
     /// The declared SubDevices that are not in their target states, without absent optional ones.

@@ -2,9 +2,6 @@
 
 use ringcat_wire::al::AlState;
 
-use super::MainDevice;
-#[cfg(feature = "standby")]
-use crate::role::MainDeviceRole;
 use crate::segment::member::Phase;
 
 /// State of a declared SubDevice.
@@ -37,22 +34,6 @@ impl GroupState {
     /// All of them are in their declared states.
     pub const fn has_joined(&self) -> bool {
         self.settled == self.members
-    }
-}
-
-impl MainDevice {
-    /// Whether states of SubDevices are known: an INACTIVE has them from the ACTIVE, while there is one.
-    pub(super) fn are_states_known(&self) -> bool {
-        #[cfg(feature = "standby")]
-        let is_known = self.role() == MainDeviceRole::Active || !self.segment.board.is_silent();
-        #[cfg(not(feature = "standby"))]
-        let is_known = true;
-        is_known
-    }
-
-    /// The state of a SubDevice that has this phase in the model.
-    pub(super) fn known_state(&self, phase: Phase) -> SubDeviceState {
-        if self.are_states_known() { phase.into() } else { SubDeviceState::Unknown }
     }
 }
 

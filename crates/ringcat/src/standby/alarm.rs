@@ -1,5 +1,5 @@
-//! An INACTIVE that waits for an ACTIVE raises an alarm when none is there: outputs then stand still, or their watchdogs
-//! have expired.
+//! An INACTIVE that waits for an ACTIVE raises an alarm when none is there: outputs then stand still, or their
+//! watchdogs have expired.
 
 use std::time::Duration;
 
