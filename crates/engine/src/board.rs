@@ -254,23 +254,23 @@ impl Board {
         (self.supervision.load(Ordering::Relaxed), is_any)
     }
 
-    /// The latest supervision result; none while supervision frames do not come back, and after the application has
-    /// ended.
+    /// The latest supervision result; none while supervision frames do not come back, after the application has ended,
+    /// and of an INACTIVE without an ACTIVE.
     pub fn responding(&self) -> Supervision {
         let seen = self.supervision().filter(|_| !self.is_silent());
         seen.map(|(_, supervision)| supervision).unwrap_or_default()
     }
 
-    /// Whether supervision frames do not come back, or the application has ended: then no SubDevice is known to be
-    /// present.
+    /// Whether supervision frames do not come back, the application has ended, or no ACTIVE reports to this INACTIVE:
+    /// then no SubDevice is known to be present.
     pub fn is_silent(&self) -> bool {
         self.live.is_silent(self.supervision_count.load(Ordering::Acquire))
     }
 
     /// Posts that the ACTIVE does not report any more: no SubDevice is known to be present.
     #[cfg(feature = "standby")]
-    pub(crate) fn post_unheard(&self) {
-        self.live.post_unheard(self.supervision_count.load(Ordering::Acquire));
+    pub(crate) fn post_no_active(&self) {
+        self.live.post_no_active(self.supervision_count.load(Ordering::Acquire));
     }
 
     /// Posts the carriers of the links.

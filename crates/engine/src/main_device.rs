@@ -350,10 +350,15 @@ impl MainDevice {
             && access.members().all(|member| member.config.optional || matches!(member.phase, Phase::Settled(_)))
     }
 
-    /// The present state of each hot connect group, by its number.
+    /// The present state of each hot connect group, by its number. Without an ACTIVE an INACTIVE knows of none that is
+    /// present.
     pub fn groups(&self) -> Vec<GroupState> {
-        let counts = counts(self.segment.view().subdevices());
-        counts.into_iter().map(|(present, settled, members)| GroupState { present, settled, members }).collect()
+        let (counts, is_known) = (counts(self.segment.view().subdevices()), self.are_states_known());
+        let group = |(present, settled, members)| match is_known {
+            true => GroupState { present, settled, members },
+            false => GroupState { present: 0, settled: 0, members },
+        };
+        counts.into_iter().map(group).collect()
     }
 
     /// Takes the oldest event of either half.

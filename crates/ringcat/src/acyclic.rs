@@ -33,16 +33,16 @@ pub trait AcyclicHalf {
     #[cfg(feature = "standby")]
     fn take_returned(&mut self, frame: &[u8], now: Instant);
 
-    /// Reports SubDevices whose watchdog is shorter than a takeover may last. Does not wait.
+    /// Reports SubDevices whose watchdog is not longer than process data may be missing in a takeover. Does not wait.
     #[cfg(feature = "standby")]
-    fn report_watchdogs_below(&mut self, needed: Duration, now: Instant);
+    fn report_watchdogs_within(&mut self, gap: Duration, cycle: Duration, now: Instant);
 
-    /// These SubDevices, and their watchdogs. Not for the cyclic path.
+    /// These SubDevices, their watchdogs, and the time that process data may be missing. Not for the cyclic path.
     ///
     /// # Errors
     /// Its thread has ended.
     #[cfg(feature = "standby")]
-    fn watchdogs_below(&self, needed: Duration) -> Result<Vec<(SubDeviceId, Duration)>, Error>;
+    fn watchdogs_within(&self, gap: Duration, cycle: Duration) -> Result<Vec<(SubDeviceId, Duration, Duration)>, Error>;
 
     /// Runs procedures, and sends on shared links as far as the window allows.
     fn work(&mut self, links: &mut impl Links, window: &Window);
@@ -123,13 +123,13 @@ impl AcyclicHalf for Inline {
     }
 
     #[cfg(feature = "standby")]
-    fn report_watchdogs_below(&mut self, needed: Duration, now: Instant) {
-        self.engine.report_watchdogs_below(needed, now);
+    fn report_watchdogs_within(&mut self, gap: Duration, cycle: Duration, now: Instant) {
+        self.engine.report_watchdogs_within(gap, cycle, now);
     }
 
     #[cfg(feature = "standby")]
-    fn watchdogs_below(&self, needed: Duration) -> Result<Vec<(SubDeviceId, Duration)>, Error> {
-        Ok(self.engine.watchdogs_below(needed))
+    fn watchdogs_within(&self, gap: Duration, cycle: Duration) -> Result<Vec<(SubDeviceId, Duration, Duration)>, Error> {
+        Ok(self.engine.watchdogs_within(gap, cycle))
     }
 
     fn work(&mut self, links: &mut impl Links, window: &Window) {

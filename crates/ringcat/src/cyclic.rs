@@ -131,6 +131,8 @@ impl Cyclic {
     pub fn begin_last(&mut self) {
         self.set_trigger(Trigger::Time);
         self.ends = true;
+        #[cfg(feature = "standby")]
+        self.exchange.end_offers();
     }
 
     pub fn set_trigger(&mut self, trigger: Trigger) {

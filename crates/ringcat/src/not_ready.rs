@@ -28,6 +28,8 @@ pub struct NotReady {
 pub enum Reason {
     /// It does not answer.
     Absent,
+    /// Its state is unknown: no ACTIVE reports it to this INACTIVE.
+    Unknown,
     /// It is being configured, or waits for the next attempt.
     Configuring {
         /// Reason of the last failed attempt, if there is one.
@@ -39,6 +41,7 @@ impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Reason::Absent => f.write_str("does not answer"),
+            Reason::Unknown => f.write_str("is unknown: no ACTIVE reports it"),
             Reason::Configuring { failed: None } => f.write_str("is still being configured"),
             Reason::Configuring { failed: Some(reason) } => write!(f, "configuration failed: {reason}"),
         }
@@ -92,6 +95,7 @@ impl Failures {
             let failed = self.0.get(subdevice.0).cloned().flatten();
             let reason = match state {
                 SubDeviceState::Absent => Reason::Absent,
+                SubDeviceState::Unknown => Reason::Unknown,
                 _ => Reason::Configuring { failed },
             };
             (name, reason)

@@ -192,8 +192,14 @@ impl LiveWords {
     /// The ACTIVE has not reported anything since the result with this number: what it reported last is kept for a
     /// takeover, and is not known any more to readers.
     #[cfg(feature = "standby")]
-    pub(super) fn post_unheard(&self, number: u64) {
+    pub(super) fn post_no_active(&self, number: u64) {
         self.silence.store(number << 8 | LOSSES, Ordering::Relaxed);
+    }
+
+    /// This MainDevice is ACTIVE: what was reported last counts until its own frames show more.
+    #[cfg(feature = "standby")]
+    pub(crate) fn end_silence(&self) {
+        self.silence.store(0, Ordering::Relaxed);
     }
 
     /// No supervision frame follows the result with this number: nothing is known of SubDevices and links any more.

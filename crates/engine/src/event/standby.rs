@@ -64,23 +64,25 @@ pub enum StandbyEvent {
     /// A requested change of the role was refused: this write into the memory of a SubDevice is under way, and the
     /// change would cut it off ([`RoleControl::force`](crate::role::RoleControl::force)).
     RoleRefused(MemoryWrite),
-    /// No ACTIVE is there for the time-out, and this MainDevice is not allowed to take over, or has no link: outputs of
-    /// the SubDevices stay as they are or are switched off by their watchdogs. Once per silence; the next event is
-    /// [`StandbyEvent::ActiveIsBack`] or [`StandbyEvent::RoleChanged`].
+    /// No ACTIVE sends process data, and this MainDevice is not allowed to take over, or has no link: outputs of the
+    /// SubDevices stay as they are or are switched off by their watchdogs. After the time-out of the policy, or three
+    /// times it where the policy takes over; before an application after the time of listening, or twice it. Once per
+    /// silence; the next event is [`StandbyEvent::ActiveIsBack`] or [`StandbyEvent::RoleChanged`]. Without a policy it
+    /// is not reported.
     NoActive {
-        /// Time since the last frame of an ACTIVE, or since this MainDevice began to wait for one.
+        /// Time since the last process data of an ACTIVE, or since this MainDevice began to wait for one.
         silence: Duration,
     },
     /// After [`StandbyEvent::NoActive`]: an ACTIVE is there.
     ActiveIsBack,
-    /// The watchdog of a SubDevice with outputs, as declared, is shorter than a takeover may last: it leaves OP in one.
-    /// Once when the policy is set.
+    /// The watchdog of a SubDevice with outputs, as declared, is not longer than process data may be missing in a
+    /// takeover: it leaves OP in one. Once when the policy is set.
     WatchdogTooShort {
         /// The SubDevice.
         subdevice: SubDeviceId,
         /// Its watchdog for process data (registers 0x0400, 0x0420).
         watchdog: Duration,
-        /// The time-out and two cycles (protocol 9.9).
+        /// The time-out and two cycles (protocol 9.9); more where its outputs are not exchanged in each cycle.
         needed: Duration,
     },
     /// The knowledge of the segment is too long for its place in master frames: the other MainDevice cannot follow, and

@@ -68,6 +68,8 @@ pub(crate) struct Following {
     /// When the first master frame of the newest cycle arrived.
     begun_at: Instant,
     pub unusable: Option<Unusable>,
+    /// Another ACTIVE is followed, or the same one that has begun anew, since [`Following::take_anew`].
+    is_anew: bool,
     /// The answer, without what depends on the cycle.
     pub answer: Answer,
     /// Process data of this MainDevice for the ACTIVE.
@@ -89,6 +91,7 @@ impl Following {
             ended: [None; 2],
             begun_at: Instant::NEVER,
             unusable: None,
+            is_anew: false,
             answer: Answer { not_ready: NotReady::NO_CYCLE, ..Answer::new() },
             lengths,
             words,
@@ -120,6 +123,18 @@ impl Following {
         self.has_whole && self.whole.cycle.wrapping_sub(cycle) as i32 >= 0
     }
 
+    /// Whether another ACTIVE is followed since the last call, or the same one that has begun anew: what is known of the
+    /// one before counts no more.
+    pub fn take_anew(&mut self) -> bool {
+        core::mem::take(&mut self.is_anew)
+    }
+
+    /// Another ACTIVE is followed, or the same one has begun anew.
+    fn begin_anew(&mut self, sender: Option<[u8; 3]>) {
+        self.reset();
+        (self.sender, self.is_anew) = (sender, true);
+    }
+
     /// Forgets the ACTIVE: what is whole stays.
     pub fn forget(&mut self) {
         (self.sender, self.newest, self.ended) = (None, None, [None; 2]);
@@ -149,8 +164,7 @@ impl Following {
         let Some((sender, sequence)) = foreign_frame(frame).filter(|_| is_of_cycle) else { return true };
         if *self.sender.get_or_insert(sender) != sender {
             // Another one controls the bus now.
-            self.forget();
-            self.sender = Some(sender);
+            self.begin_anew(Some(sender));
         }
         let mut cycle = None;
         for fragment in fragments_mut(frame) {
@@ -208,9 +222,7 @@ impl Following {
     fn begin(&mut self, number: u32, now: Instant) -> bool {
         let age = self.newest.map_or(1, |newest| number.wrapping_sub(newest) as i32);
         if age < ANEW {
-            let sender = self.sender;
-            self.forget();
-            self.sender = sender;
+            self.begin_anew(self.sender);
         } else if age < -1 {
             return false;
         }

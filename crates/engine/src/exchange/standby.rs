@@ -29,7 +29,7 @@ use crate::role::{MainDeviceRole, Partner, RoleControl};
 use crate::time::Instant;
 
 use partner::{Items, PartnerWatch};
-use state::{Standby, StandbySetup, State};
+use state::{Offers, Standby, StandbySetup, State};
 
 impl Exchange {
     /// From now on this MainDevice is one of two in a ring, in the role of its control. Not for the cyclic path: this
@@ -59,6 +59,7 @@ impl Exchange {
             exchanges_from,
             yields_without_links: setup.yields_without_links,
             goes_through_init: setup.goes_through_init,
+            offers: Offers::Possible,
             is_forced: false,
             offered: 0,
             shown: None,
@@ -122,6 +123,16 @@ impl Exchange {
     /// Reports what a policy has found, in order with the events of the exchange. For the cyclic path.
     pub fn report_standby(&mut self, event: CyclicStandbyEvent) {
         self.events.push(event.pack());
+    }
+
+    /// The application ends: the role is not offered from now on, and an offer is withdrawn. One whose last cycle has
+    /// gone still yields with the next cycle. Otherwise the other MainDevice would become ACTIVE while this one stops
+    /// the SubDevices.
+    pub fn end_offers(&mut self) {
+        if let Some(state) = self.standby.0.as_deref_mut() {
+            state.offers = Offers::Ended;
+            state.withdraw_offer();
+        }
     }
 
     /// Process data for the other MainDevice: what leaves in this role. The bytes of the other direction are left out

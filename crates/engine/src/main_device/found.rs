@@ -47,7 +47,7 @@ impl MainDevice {
             config: (*member.config).clone(),
             info: member.info.map(|info| (**info).clone()),
             position: member.info.and_then(|_| found()).map(|info| info.position),
-            is_absent: SubDeviceState::from(member.phase) == SubDeviceState::Absent,
+            is_absent: self.known_state(member.phase) == SubDeviceState::Absent,
         })
     }
 

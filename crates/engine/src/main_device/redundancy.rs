@@ -12,6 +12,7 @@ use super::prepare::watchdog_of;
 use super::standby::Marks;
 use crate::board::standby::KNOWLEDGE_ROOM;
 use crate::declared::SubDeviceId;
+use crate::direction::Direction;
 use crate::event::{Event, StandbyEvent};
 use crate::exchange::{Exchange, StandbySetup};
 use crate::knowledge::Knowledge;
@@ -86,22 +87,31 @@ impl MainDevice {
         self.supervisor.append_event(now, Event::Standby(event), 0);
     }
 
-    /// SubDevices with outputs whose watchdog is shorter than this time, as declared, and its time. A gap of process
-    /// data that lasts longer takes them out of OP. Empty before there is an application.
-    pub fn watchdogs_below(&self, time: Duration) -> Vec<(SubDeviceId, Duration)> {
+    /// SubDevices with outputs whose watchdog, as declared, is not longer than process data may be missing in a
+    /// takeover: its time, and that time. `gap`: how long cycles of the period `cycle` may be missing; outputs of a
+    /// domain with a longer period come later by as much. Empty before there is an application.
+    pub fn watchdogs_within(&self, gap: Duration, cycle: Duration) -> Vec<(SubDeviceId, Duration, Duration)> {
         let view = self.segment.view();
         let short = |(index, member): (usize, MemberView<'_>)| {
             let plan = &member.setup.as_ref()?.plan;
-            let is_watched = plan.process_data.iter().any(|area| area.register.control.watchdog);
-            let watchdog = watchdog_of(&member).filter(|watchdog| is_watched && *watchdog < time)?;
-            Some((SubDeviceId(index), watchdog))
+            let watched = plan
+                .process_data
+                .iter()
+                .filter(|it| it.direction == Direction::Outputs && it.length > 0 && it.register.control.watchdog);
+            let periods = watched.filter_map(|it| {
+                let (domain, _) = view.layout().area(index, it.sync_manager)?;
+                Some(view.layout().domains.get(domain.0)?.period)
+            });
+            let needed = gap.saturating_add(periods.max()?.saturating_sub(cycle));
+            let watchdog = watchdog_of(&member).filter(|watchdog| *watchdog <= needed)?;
+            Some((SubDeviceId(index), watchdog, needed))
         };
         view.members().enumerate().filter_map(short).collect()
     }
 
     /// Reports each of these SubDevices.
-    pub fn report_watchdogs_below(&mut self, needed: Duration, now: Instant) {
-        for (subdevice, watchdog) in self.watchdogs_below(needed) {
+    pub fn report_watchdogs_within(&mut self, gap: Duration, cycle: Duration, now: Instant) {
+        for (subdevice, watchdog, needed) in self.watchdogs_within(gap, cycle) {
             self.report_standby(StandbyEvent::WatchdogTooShort { subdevice, watchdog, needed }, now);
         }
     }

@@ -161,7 +161,8 @@ impl MainDevice {
         self.learn_clocks(takeover);
         self.adopt_mailboxes(&lives);
         let is_hot = takeover != Takeover::ThroughInit;
-        let took_over = StandbyObservation::TookOver { lives: &lives, is_hot };
+        let is_of_other = takeover == Takeover::FromOther;
+        let took_over = StandbyObservation::TookOver { lives: &lives, is_of_other, is_hot };
         self.segment.observe(Observation::Standby(took_over));
         let segment = self.segment.clone();
         self.start_reconcile(segment);

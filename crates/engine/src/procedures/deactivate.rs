@@ -64,7 +64,7 @@ pub(crate) async fn deactivate(
     let declared = to_stop.clone();
     // Neither a SubDevice that does not leave its state nor lost frames must take the time of the others.
     let stopping = stop(bus, to_stop, AlState::PreOp, limit / 2);
-    let stopped = bus.within(limit * 3 / 4, stopping).await.unwrap_or(Err(StopError::NoAnswer));
+    let stopped = bus.within(limit - limit / 4, stopping).await.unwrap_or(Err(StopError::NoAnswer));
     // A scan that loses frames must not take longer.
     let scanning = scan_until(bus, segment, options, &known, until);
     let _ = bus.within(until.since(bus.now()), scanning).await;

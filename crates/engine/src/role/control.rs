@@ -14,7 +14,7 @@ use super::MainDeviceRole;
 #[non_exhaustive]
 pub enum RoleRequest {
     /// It becomes ACTIVE with the next cycle, whatever the other MainDevice does. One that is ACTIVE stays it, and
-    /// withdraws an offer of its role that is under way.
+    /// withdraws an offer of its role that is under way, without an event; not after its last cycle has gone.
     Active,
     /// It becomes INACTIVE with the next cycle, whether or not the other MainDevice takes over.
     Inactive,

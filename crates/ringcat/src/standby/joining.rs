@@ -72,7 +72,7 @@ impl Joining {
 
     /// Whether an alarm is to be reported. One that becomes ACTIVE has time to do so.
     pub(crate) fn look_out(&mut self, partner: &PartnerStatus, now: Instant) -> Option<Notice> {
-        self.lookout.note(partner.at, if self.takes_over { self.limit * 2 } else { self.limit }, now)
+        self.lookout.note(partner.at, self.limit.saturating_mul(if self.takes_over { 2 } else { 1 }), now)
     }
 
     pub(crate) fn decide(&mut self, partner: &PartnerStatus, has_link: bool, now: Instant) -> Next {

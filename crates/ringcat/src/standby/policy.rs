@@ -106,7 +106,7 @@ impl Policy {
     /// How long process data may be missing in a takeover: the time-out and two cycles (protocol 9.9). A watchdog of a
     /// SubDevice with outputs has to be longer.
     pub fn longest_gap_of(&self, period: Duration) -> Duration {
-        self.time_out_of(period) + 2 * period
+        self.time_out_of(period).saturating_add(2 * period)
     }
 
     /// The time-out with cycles of this period.
@@ -165,7 +165,7 @@ impl Watch {
             self.lookout.is_active(now);
             return None;
         }
-        let limit = self.time_out * if self.policy.takes_over { 3 } else { 1 };
+        let limit = self.time_out.saturating_mul(if self.policy.takes_over { 3 } else { 1 });
         self.lookout.note(situation.partner_data_at.or(situation.partner_frame_at), limit, now)
     }
 

@@ -46,18 +46,20 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// a takeover may last are reported ([`StandbyEvent::WatchdogTooShort`](super::StandbyEvent)).
     pub fn set_policy(&mut self, policy: Option<Policy>) {
         self.cyclic.set_policy(policy, &self.links);
-        if let Some(needed) = policy.and_then(|policy| self.longest_gap(&policy)) {
-            self.acyclic.report_watchdogs_below(needed, self.links.now());
+        if let Some(gap) = policy.and_then(|policy| self.longest_gap(&policy)) {
+            self.acyclic.report_watchdogs_within(gap, self.cyclic.period(), self.links.now());
         }
     }
 
-    /// The SubDevices with outputs whose watchdog, as declared, is shorter than a takeover with this policy may last,
-    /// and its time. They leave OP in a takeover. None if this policy does not take over.
+    /// The SubDevices with outputs whose watchdog, as declared, is not longer than process data may be missing in a
+    /// takeover with this policy: its time, and how long it may be missing. They leave OP in a takeover. None if this
+    /// policy does not take over.
     ///
     /// # Errors
     /// The thread of the acyclic half has ended.
-    pub fn short_watchdogs(&self, policy: &Policy) -> Result<Vec<(SubDeviceId, Duration)>, Error> {
-        self.longest_gap(policy).map_or(Ok(Vec::new()), |needed| self.acyclic.watchdogs_below(needed))
+    pub fn short_watchdogs(&self, policy: &Policy) -> Result<Vec<(SubDeviceId, Duration, Duration)>, Error> {
+        let within = |gap| self.acyclic.watchdogs_within(gap, self.cyclic.period());
+        self.longest_gap(policy).map_or(Ok(Vec::new()), within)
     }
 
     /// How long process data may be missing in a takeover with this policy ([`Policy::longest_gap_of`]); `None` if it

@@ -45,17 +45,17 @@ impl AcyclicHalf for SupervisorThread {
     }
 
     #[cfg(feature = "standby")]
-    fn report_watchdogs_below(&mut self, needed: Duration, now: Instant) {
+    fn report_watchdogs_within(&mut self, gap: Duration, cycle: Duration, now: Instant) {
         // If the thread has ended there is nothing to report.
         let _ = self.begin(move |engine, _| {
-            engine.report_watchdogs_below(needed, now);
+            engine.report_watchdogs_within(gap, cycle, now);
             Box::new(|_, _| true)
         });
     }
 
     #[cfg(feature = "standby")]
-    fn watchdogs_below(&self, needed: Duration) -> Result<Vec<(SubDeviceId, Duration)>, Error> {
-        self.act(move |engine| engine.watchdogs_below(needed))
+    fn watchdogs_within(&self, gap: Duration, cycle: Duration) -> Result<Vec<(SubDeviceId, Duration, Duration)>, Error> {
+        self.act(move |engine| engine.watchdogs_within(gap, cycle))
     }
 
     fn states(&self) -> Vec<SubDeviceState> {

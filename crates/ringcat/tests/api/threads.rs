@@ -86,7 +86,10 @@ fn a_hand_over_waits_for_the_end_of_a_measurement_that_has_opened_the_ring() -> 
         network.devices().map(|device| device.controller.register(map::DL_CONTROL, 2)[1]).collect()
     };
     let mut opened = 0;
-    while opened < 5 {
+    for _ in 0..100 {
+        if opened == 5 {
+            break;
+        }
         let (cyclic, acyclic) = SharedSegment::halves(network());
         let plant = cyclic.plant();
         let supervisor = SupervisorThread::start(acyclic, &Options::default(), || ())?;
@@ -98,6 +101,7 @@ fn a_hand_over_waits_for_the_end_of_a_measurement_that_has_opened_the_ring() -> 
         assert!(supervisor.hand_over()?.is_some());
         assert_eq!(plant.with_network(loops), [0; 3]);
     }
+    assert_eq!(opened, 5, "it is seen open");
     Ok(())
 }
 

@@ -12,7 +12,7 @@ use scenarios::pair::{CYCLE, Pair};
 use super::ring_of_two;
 
 /// Reported SubDevices with their watchdogs and what is needed, and those of `short_watchdogs`.
-type Short = (Vec<(usize, Duration, Duration)>, Vec<(usize, Duration)>);
+type Short = [Vec<(usize, Duration, Duration)>; 2];
 
 /// An ACTIVE whose SubDevices have these watchdogs in units of 100 us, with a policy.
 fn reported(watchdogs: &[(usize, u16)], policy: Policy) -> Short {
@@ -41,8 +41,8 @@ fn reported(watchdogs: &[(usize, u16)], policy: Policy) -> Short {
             }
         }
         let short = application.short_watchdogs(&policy).expect("it runs here");
-        let short = short.into_iter().map(|(SubDeviceId(number), watchdog)| (number, watchdog)).collect();
-        sender.send((events, short)).expect("the test waits");
+        let short = short.into_iter().map(|(SubDeviceId(number), watchdog, needed)| (number, watchdog, needed));
+        sender.send([events, short.collect()]).expect("the test waits");
     };
     pair.hosts().start(Host::First, program).expect("a thread starts");
     pair.hosts().run_for(Duration::from_secs(2));
@@ -55,15 +55,15 @@ fn a_watchdog_that_is_shorter_than_a_takeover_is_named_when_the_policy_is_set() 
     let ms = Duration::from_millis;
     let policy = Policy::default().with_time_out(3, Duration::ZERO);
     // 1 has outputs, 2 inputs, 3 both; a takeover lasts 3 and 2 cycles of 1 ms.
-    assert_eq!(reported(&[(1, 50), (2, 10), (3, 0)], policy), (vec![], vec![]), "long enough, inputs, off");
-    let short = reported(&[(1, 49), (2, 10), (3, 40)], policy);
-    let micros = Duration::from_micros;
-    assert_eq!(short.0, [(1, micros(4900), ms(5)), (3, ms(4), ms(5))]);
-    assert_eq!(short.1, [(1, micros(4900)), (3, ms(4))]);
+    let none: Short = [vec![], vec![]];
+    assert_eq!(reported(&[(1, 51), (2, 10), (3, 0)], policy), none, "long enough, inputs, off");
+    let [events, short] = reported(&[(1, 50), (2, 10), (3, 40)], policy);
+    assert_eq!(events, [(1, ms(5), ms(5)), (3, ms(4), ms(5))]);
+    assert_eq!(short, events);
     // The default is 100 ms.
-    let (events, short) = reported(&[], policy.with_time_out(99, Duration::ZERO));
-    assert_eq!(events, [(1, ms(100), ms(101)), (3, ms(100), ms(101))]);
-    assert_eq!(short.len(), 2);
+    let [events, short] = reported(&[], policy.with_time_out(98, Duration::ZERO));
+    assert_eq!(events, [(1, ms(100), ms(100)), (3, ms(100), ms(100))]);
+    assert_eq!(short, events);
     let held = Policy::permanent_standby().with_time_out(99, Duration::ZERO);
-    assert_eq!(reported(&[(1, 10)], held), (vec![], vec![]), "it does not take over");
+    assert_eq!(reported(&[(1, 10)], held), none, "it does not take over");
 }

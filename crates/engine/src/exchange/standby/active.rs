@@ -5,7 +5,7 @@ use ringcat_wire::master_frame::{Phase, Stage, header_of_frame};
 
 use super::Exchange;
 use super::partner::{Difference, Items};
-use super::state::State;
+use super::state::{Offers, State};
 use crate::event::CyclicStandbyEvent;
 use crate::exchange::Received;
 use crate::exchange::flight::Step;
@@ -160,7 +160,7 @@ impl State {
             return;
         }
         let partner = self.watch.partner();
-        if matches!(partner, Partner::Alive { .. }) && partner.is_ready() {
+        if self.offers == Offers::Possible && matches!(partner, Partner::Alive { .. }) && partner.is_ready() {
             (self.offered, self.frames.header.phase) = (0, Phase::Offers);
         } else {
             events.push(CyclicStandbyEvent::HandOverRefused(partner).pack());

@@ -30,6 +30,9 @@ impl Exchange {
         {
             state.words.post_partner_frame(now);
             state.following.fill(arrived_on, frame, now);
+            if state.following.take_anew() {
+                state.outputs.forget();
+            }
         }
     }
 
@@ -81,7 +84,7 @@ impl State {
         let whole = self.following.whole();
         let is_late = whole.is_none_or(|whole| now.since(whole.at).as_nanos() > u128::from(limit));
         if is_late {
-            board.post_unheard();
+            board.post_no_active();
         }
         let header = whole.map(|whole| whole.header);
         let is_down = |link: &Link| board.live.carrier(*link) == Some(false);
@@ -135,7 +138,7 @@ impl State {
     }
 
     /// Posts what the last whole cycle contains about SubDevices, ring and links.
-    fn post_whole(&self, board: &Board) {
+    pub(super) fn post_whole(&self, board: &Board) {
         let Some(whole) = self.following.whole() else { return };
         for (subdevice, byte) in whole.content.subdevices.iter().enumerate() {
             let record = SubDeviceRecord(*byte);

@@ -99,9 +99,14 @@ impl Exchange {
         let takeover = state.takeover();
         let in_state = match takeover {
             Takeover::ThroughInit => 0,
-            Takeover::FromOther => state.take_part(&self.board),
+            Takeover::FromOther => {
+                // The role may change before the first cycle as INACTIVE.
+                state.post_whole(&self.board);
+                state.take_part(&self.board)
+            }
             Takeover::FromItself => settled(&self.board),
         };
+        self.board.live.end_silence();
         state.words.post_takeover(takeover);
         let silence = last.map(|(_, at)| now.since(at));
         let cut = last.and_then(|(cycle, _)| state.following.header_of(cycle)).and_then(|(header, _)| header.write);
@@ -152,6 +157,12 @@ impl State {
     #[cold]
     fn permitted_request(&mut self, now: Instant, events: &mut Producer) -> Option<RoleRequest> {
         let (request, is_forced) = self.control.take_request()?;
+        let is_offered = self.role == MainDeviceRole::Active && self.frames.header.phase != Phase::Goes;
+        if is_offered && request == RoleRequest::HandOver {
+            // It is under way; it may be forced now.
+            self.is_forced |= is_forced;
+            return None;
+        }
         self.is_forced = is_forced;
         let write = match (self.role, request) {
             _ if is_forced => None,

@@ -37,6 +37,15 @@ pub struct StandbySetup {
     pub words: Arc<StandbyWords>,
 }
 
+/// Whether the role may be offered to the other MainDevice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::exchange) enum Offers {
+    /// It may.
+    Possible,
+    /// Not any more: the application ends, and acts on the SubDevices as ACTIVE afterwards.
+    Ended,
+}
+
 /// MainDevice redundancy, if it is set up.
 #[derive(Debug, Default)]
 pub(in crate::exchange) struct Standby(pub(in crate::exchange) Option<Box<State>>);
@@ -56,6 +65,8 @@ pub(in crate::exchange) struct State {
     pub exchanges_from: Arc<[u8]>,
     pub yields_without_links: bool,
     pub goes_through_init: bool,
+    /// Whether the role may be offered.
+    pub offers: Offers,
     /// The last request was forced.
     pub is_forced: bool,
     /// Cycles in which the role was offered.

@@ -73,9 +73,8 @@ impl Segment {
     /// address, and with what the last scan knows of it.
     fn doubt_scanned(&mut self, station: StationAddress) {
         let Some(scanned) = self.stage.scanned_mut() else { return };
-        let is_it = |it: &&mut Rc<SubDeviceInfo>| it.station == station;
-        if let Some(known) = Rc::make_mut(&mut scanned.found).subdevices.iter_mut().find(is_it) {
-            Rc::make_mut(known).pdo_source = PdoSource::Outdated;
+        if let Some(at) = scanned.found.subdevices.iter().position(|it| it.station == station) {
+            Rc::make_mut(&mut Rc::make_mut(&mut scanned.found).subdevices[at]).pdo_source = PdoSource::Outdated;
         }
     }
 

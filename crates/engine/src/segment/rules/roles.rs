@@ -25,7 +25,12 @@ impl Segment {
             self.link_control.restore(effects);
         }
         match seen {
-            StandbyObservation::TookOver { lives, is_hot } => self.take_bus(lives, is_hot, effects),
+            StandbyObservation::TookOver { lives, is_hot, is_of_other } => {
+                if is_of_other && is_hot {
+                    self.report_missing(lives, effects);
+                }
+                self.take_bus(lives, is_hot, effects);
+            }
             StandbyObservation::Yielded => self.yield_bus(),
             StandbyObservation::Mirrored => self.mirror(),
         }
@@ -44,19 +49,26 @@ impl Segment {
         self.begin_watches(Watch::AdoptedClocks, effects);
         for (index, life) in lives.iter().enumerate() {
             match life.presence {
-                Presence::Offline => self.expect_absent(index, effects),
+                Presence::Offline => self.expect_absent(index),
                 Presence::Configuring | Presence::Settled => self.adopt_member(index, *life, effects),
             }
         }
         self.attention.want();
     }
 
-    /// A member that did not answer to the other MainDevice. That is reported here as well (protocol MR-23): events of
-    /// the other one are not known to this application.
-    fn expect_absent(&mut self, index: usize, effects: &mut Effects) {
+    /// Members that did not answer to the other MainDevice are reported here as well (protocol MR-23): its events are
+    /// not known to this application.
+    fn report_missing(&self, lives: &[Life], effects: &mut Effects) {
+        for (index, _) in lives.iter().enumerate().filter(|(_, life)| life.presence == Presence::Offline) {
+            let Some(member) = self.member(index) else { return };
+            effects.report(Event::Missing { subdevice: SubDeviceId(index), optional: member.config.optional });
+        }
+    }
+
+    /// A member that did not answer to the other MainDevice.
+    fn expect_absent(&mut self, index: usize) {
         let Some(member) = self.subdevices.member_mut(index) else { return };
         member.phase = Phase::Absent;
-        effects.report(Event::Missing { subdevice: SubDeviceId(index), optional: member.config.optional });
         let is_excused = !member.exchanges(member.target);
         self.board.set_taking_part(index, false);
         self.board.set_excused(index, is_excused);

@@ -8,7 +8,6 @@ use crate::info::SubDeviceInfo;
 use crate::segment::effect::{Effect, Effects, Task, Watch};
 use crate::segment::idle::Comparison;
 use crate::segment::key::SubDeviceKey;
-use crate::segment::link_order::LinkObservation;
 use crate::segment::model::{Declared, Segment};
 use crate::segment::scan::{Found, Scan};
 use crate::segment::stage::{Scanned, Stage};
@@ -140,8 +139,6 @@ impl Segment {
         let stage = scanned.map_or(Stage::Unscanned, |it| Stage::Scanned(Scanned { registers: Start::Doubtful, ..it }));
         self.begin(stage, Declared { subdevices, ..Declared::default() });
         self.link_control.restore(effects);
-        // Idle operation notices it when it is up.
-        self.link_control.observe(LinkObservation::Connected, effects);
     }
 
     /// Begins a stage. Nothing of the last declaration remains; findings that were requested before are refused.

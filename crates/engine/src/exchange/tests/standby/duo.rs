@@ -37,7 +37,7 @@ pub struct Device {
 }
 
 impl Device {
-    fn new(last: u8, role: MainDeviceRole, sizes: MasterSizes, (identity, items): (u64, &[u32])) -> Device {
+    pub fn new(last: u8, role: MainDeviceRole, sizes: MasterSizes, (identity, items): (u64, &[u32])) -> Device {
         let area = |subdevice, direction| AreaSpec { subdevice, sync_manager: direction as u8, direction, length: 1 };
         let areas = (0..3).flat_map(|s| [area(s, Direction::Outputs), area(s, Direction::Inputs)]).collect();
         let spec = DomainSpec { period: PERIOD, under_way: 1, lrw: true, areas, image: ImageOrder::Packed };

@@ -86,6 +86,25 @@ fn a_request_to_stay_active_withdraws_an_offer() {
     duo.received.iter().for_each(|received| assert_eq!(received.len(), 26));
 }
 
+// covers: MR-07, MR-05, standby
+#[test]
+fn an_application_that_ends_withdraws_its_offer_unless_its_last_cycle_has_gone() {
+    // The role is offered in the first cycle, and the second one is the last.
+    for cycles in 0..=3 {
+        let mut duo = Duo::new(MasterSizes::default());
+        count(&mut duo, 0, 5);
+        duo.drain();
+        duo.first.control.request(RoleRequest::HandOver);
+        count(&mut duo, 5, cycles);
+        duo.first.exchange.end_offers();
+        count(&mut duo, 10, 10);
+        assert_eq!((duo.first.is_active(), duo.second.is_active()), (cycles < 2, cycles >= 2), "{cycles} cycles");
+        let refused = |event: &CyclicStandbyEvent| matches!(event, CyclicStandbyEvent::HandOverRefused(_));
+        let events = duo.first.standby_events();
+        assert_eq!(events.iter().any(refused), cycles == 0, "{cycles} cycles: {events:?}");
+    }
+}
+
 // covers: MR-07, standby
 #[test]
 fn a_role_that_the_other_one_does_not_take_is_kept_and_that_is_reported() {
@@ -122,6 +141,10 @@ fn a_write_that_begins_while_the_role_is_offered_keeps_it_unless_it_is_forced() 
         }
         count(&mut duo, 5, 1);
         duo.first.words.post_write(Some(write));
+        if is_forced {
+            // The same once more, without force, takes nothing back.
+            duo.first.control.request(RoleRequest::HandOver);
+        }
         count(&mut duo, 6, 10);
         assert_eq!((duo.first.is_active(), duo.second.is_active()), (!is_forced, is_forced));
         let refused = CyclicStandbyEvent::RoleRefused(write);

@@ -2,15 +2,20 @@
 
 use std::vec::Vec;
 
-use super::duo::{DOMAIN, Duo, End, PERIOD};
+use super::duo::{DOMAIN, Device, Duo, End, PERIOD};
+use crate::board::live::Presence;
 use crate::event::CyclicStandbyEvent;
 use crate::exchange::Received;
 use crate::layout::MasterSizes;
 use crate::link::Link;
 use crate::role::{MainDeviceRole, RoleCause, RoleRequest};
 
+fn sizes() -> MasterSizes {
+    MasterSizes { to_inactive: 2, to_active: 2, ..MasterSizes::default() }
+}
+
 fn duo() -> Duo {
-    Duo::new(MasterSizes { to_inactive: 2, to_active: 2, ..MasterSizes::default() })
+    Duo::new(sizes())
 }
 
 // covers: MR-02, MR-03, MR-04, MR-07, REQ003, REQ014, standby
@@ -149,6 +154,49 @@ fn an_active_without_links_stays_active_where_it_does_not_yield() {
     duo.first.exchange.begin_role(duo.now);
     assert!(duo.first.is_active());
     assert_eq!(duo.first.standby_events(), []);
+}
+
+// covers: MR-16, MR-18, standby
+#[test]
+fn a_takeover_before_the_first_cycle_as_inactive_has_the_states_of_the_other_one() {
+    let mut duo = duo();
+    for _ in 0..3 {
+        duo.now += PERIOD;
+        duo.first.exchange.begin_role(duo.now);
+        duo.run_active(true);
+    }
+    duo.second.control.request(RoleRequest::Active);
+    duo.second.exchange.begin_role(duo.now);
+    let lives = |device: &Device| [0, 1, 2].map(|subdevice| device.board.live.life(subdevice).expect("it is declared"));
+    assert_eq!(lives(&duo.second), lives(&duo.first));
+    assert_eq!(lives(&duo.second)[0].presence, Presence::Settled);
+    assert!(!duo.second.board.is_silent(), "they are known");
+}
+
+// covers: MR-18, MR-26, standby
+#[test]
+fn an_active_that_begins_anew_is_followed_at_once_and_what_was_before_does_not_count() {
+    let mut duo = duo();
+    (0..40).for_each(|_| duo.cycle());
+    duo.first = Device::new(0x10, MainDeviceRole::Active, sizes(), (7, &[1]));
+    duo.now += PERIOD * 6;
+    duo.second.exchange.begin_role(duo.now);
+    assert!(duo.second.board.is_silent());
+    (0..4).for_each(|_| duo.cycle());
+    assert!(!duo.second.board.is_silent() && duo.first.exchange.partner().is_ready());
+    let whole = duo.second.exchange.standby.0.as_ref().and_then(|state| state.following.whole());
+    assert!(whole.is_some_and(|whole| whole.cycle <= 4), "of the count that began anew");
+    // Once more, in another session: the registers are not those of the one before.
+    (0..30).for_each(|_| duo.cycle());
+    duo.first = Device::new(0x10, MainDeviceRole::Active, sizes(), (7, &[1]));
+    duo.first.exchange.standby.0.as_mut().expect("it is one of two").frames.header.session = 5;
+    (0..3).for_each(|_| duo.cycle());
+    duo.drain();
+    duo.second.control.request(RoleRequest::Active);
+    duo.second.exchange.begin_role(duo.now);
+    let took_over = duo.second.standby_events();
+    let is_warm = |event: &CyclicStandbyEvent| matches!(event, CyclicStandbyEvent::TookOver { is_hot: false, .. });
+    assert!(took_over.iter().any(is_warm), "{took_over:?}");
 }
 
 // covers: MR-08, 9.10, standby
