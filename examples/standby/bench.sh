@@ -162,7 +162,7 @@ switch() {
 
 # said NUMBER WORDS: whether the controller has said this since the step began.
 said() {
-    tail -c "+$((shown[$1] + 1))" "$files/c$1" 2>/dev/null | grep -q -F -- "$2"
+    tail -c "+$((shown[$1] + 1))" "$files/c$1" 2>/dev/null | grep -F -- "$2" >/dev/null
 }
 
 # states: the state of each SubDevice, with blanks between.
@@ -182,7 +182,7 @@ no_watchdog_expired() {
 
 # is_off NUMBER: both interfaces of this controller are switched off.
 is_off() {
-    ! net "c$1" -o link show up | grep -q -E "c$1(main|red)@"
+    ! net "c$1" -o link show up | grep -E "c$1(main|red)@" >/dev/null
 }
 
 # reaches NAME ADDRESS: whether IP passes.
@@ -265,6 +265,10 @@ clean_up() {
     # All that runs in namespaces of this script, guards of controllers among it.
     for name in "${names[@]}"; do
         mapfile -t -O "${#processes[@]}" processes < <(ip netns pids "$prefix-$name" 2>/dev/null)
+    done
+    # One that was just started may not be in its namespace yet.
+    for name in "${pids[@]}" "${simulator_PID:-}"; do
+        [[ -z $name ]] || processes+=("$name")
     done
     {
         [[ ${#processes[@]} == 0 ]] || kill -KILL "${processes[@]}"

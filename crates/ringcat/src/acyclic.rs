@@ -42,7 +42,8 @@ pub trait AcyclicHalf {
     /// # Errors
     /// Its thread has ended.
     #[cfg(feature = "standby")]
-    fn watchdogs_within(&self, gap: Duration, cycle: Duration) -> Result<Vec<(SubDeviceId, Duration, Duration)>, Error>;
+    fn watchdogs_within(&self, gap: Duration, cycle: Duration)
+    -> Result<Vec<(SubDeviceId, Duration, Duration)>, Error>;
 
     /// Runs procedures, and sends on shared links as far as the window allows.
     fn work(&mut self, links: &mut impl Links, window: &Window);
@@ -128,7 +129,11 @@ impl AcyclicHalf for Inline {
     }
 
     #[cfg(feature = "standby")]
-    fn watchdogs_within(&self, gap: Duration, cycle: Duration) -> Result<Vec<(SubDeviceId, Duration, Duration)>, Error> {
+    fn watchdogs_within(
+        &self,
+        gap: Duration,
+        cycle: Duration,
+    ) -> Result<Vec<(SubDeviceId, Duration, Duration)>, Error> {
         Ok(self.engine.watchdogs_within(gap, cycle))
     }
 

@@ -104,9 +104,9 @@ mod of_two;
 mod of_two;
 mod options;
 mod pace;
-// Further pages of docs, for their tests.
 #[cfg(feature = "packet")]
 pub mod packet;
+// Further pages of docs, for their tests.
 #[cfg(doctest)]
 mod pages;
 mod parts;

@@ -23,13 +23,16 @@ pub struct EventReport {
     pub refused: Option<String>,
     /// How the configuration of the other MainDevice differs.
     pub difference: Option<String>,
+    /// SubDevices whose watchdog is too short for a takeover, in words.
+    pub short_watchdogs: Vec<String>,
 }
 
 impl EventReport {
     /// From this time on.
     pub fn new(begin: Instant) -> EventReport {
         let (log, seen) = (EventLog::new(begin, Names::default()), Takeover::default());
-        EventReport { begin, log, names: Arc::default(), seen, refused: None, difference: None }
+        let (names, short_watchdogs) = (Arc::default(), Vec::new());
+        EventReport { begin, log, names, seen, refused: None, difference: None, short_watchdogs }
     }
 
     /// Prints the events since the last call.
@@ -52,6 +55,9 @@ impl EventReport {
             let Some(line) = line else { continue };
             say!("{line}");
             let text = describe(&event, self.log.names());
+            if matches!(event.event, Event::Standby(StandbyEvent::WatchdogTooShort { .. })) {
+                self.short_watchdogs.push(text.clone());
+            }
             write_event(event.at.since(self.begin), Some(name_of(&event.event)), &text);
         }
         let before = self.log.line(now, "");

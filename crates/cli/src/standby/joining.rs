@@ -7,9 +7,7 @@ use std::thread::JoinHandle;
 
 use ringcat::standby::Policy;
 use ringcat::text::Names;
-use ringcat::{
-    Application, CyclicThread, Declaration, ProcessData, Scan, SubDeviceId, SupervisorThread, Trigger, automatic,
-};
+use ringcat::{CyclicThread, Declaration, ProcessData, Scan, SupervisorThread, Trigger, automatic};
 
 use super::beating::{Beats, HalfLinks};
 use crate::failure::Failure;
@@ -23,8 +21,6 @@ use crate::thread::ThreadArguments;
 pub struct Joiner {
     pub supervisor: SupervisorThread,
     pub policy: Policy,
-    /// SubDevices whose watchdog is shorter than a takeover may last are refused.
-    pub is_strict: bool,
     pub declared: Arc<DeclarationArguments>,
     pub network: Option<Arc<ConfiguredNetwork>>,
     pub thread: ThreadArguments,
@@ -72,9 +68,6 @@ impl Joiner {
             Some(network) => network.explain(refused.error),
             None => Failure::from(refused.error),
         })?;
-        if self.is_strict {
-            self.check_watchdogs(&application)?;
-        }
         if let Some(trigger) = trigger {
             application.set_trigger(trigger);
         }
@@ -90,26 +83,6 @@ impl Joiner {
         let cycles = application.start_cycles(move || thread.prepare_cycles(), work(file, self.partner_ready))?;
         self.beats.cycles_run.store(true, Ordering::Relaxed);
         Ok(Joined { cycles, watched })
-    }
-
-    /// Refuses SubDevices whose watchdog is shorter than a takeover may last.
-    fn check_watchdogs(&self, application: &Application<HalfLinks, SupervisorThread>) -> Result<(), Failure> {
-        let short = application.short_watchdogs(&self.policy)?;
-        if short.is_empty() {
-            return Ok(());
-        }
-        let names = self.names.get().cloned().unwrap_or_default();
-        let named = short.iter().map(|(SubDeviceId(number), watchdog)| {
-            let name = names.0.get(*number).map_or("", String::as_str);
-            format!("SubDevice {number} {name} has {:.1} ms", watchdog.as_secs_f64() * 1e3)
-        });
-        let needed = application.longest_gap(&self.policy).unwrap_or_default().as_secs_f64() * 1e3;
-        let named: Vec<String> = named.collect();
-        Err(Failure::new(format!(
-            "a takeover may last {needed:.1} ms, longer than watchdogs of SubDevices: {}; a shorter --timeout or \
-             --cycle, or longer watchdogs in the file",
-            named.join(", ")
-        )))
     }
 
     /// The declaration for a scan, or that of no SubDevice, with the reason noted.

@@ -112,9 +112,10 @@ pub struct PolicyArguments {
     /// Stay INACTIVE: neither take over, nor be handed the role over
     #[arg(long, requires = "declaration")]
     permanent_standby: bool,
-    /// Refuse SubDevices whose watchdog is shorter than a takeover may last
+    /// End if the watchdog of a SubDevice is too short for a takeover
     ///
-    /// That is --timeout and two cycles. Such a SubDevice leaves OP in a takeover; without this option it is named.
+    /// Outputs may be missing for --timeout and two cycles: then such a SubDevice leaves OP. Without this option it is
+    /// named.
     #[arg(long, requires = "declaration", conflicts_with = "permanent_standby")]
     pub strict: bool,
 }

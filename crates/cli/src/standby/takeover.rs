@@ -40,7 +40,7 @@ const STOP_LIMIT: Duration = Duration::from_secs(5);
 /// The other MainDevice has this long to take the role.
 const HAND_OVER_LIMIT: Duration = Duration::from_secs(1);
 /// The last events arrive within this time.
-const LAST_NEWS: Duration = Duration::from_millis(30);
+const LAST_EVENTS: Duration = Duration::from_millis(30);
 /// A bus that is being brought up when the end comes is finished first, for this long at most: only then is it known
 /// what to stop.
 const BRING_UP_LIMIT: Duration = Duration::from_secs(20);
@@ -107,7 +107,6 @@ impl Controller<'_> {
         let joiner = Joiner {
             supervisor: self.supervisor.clone(),
             policy: arguments.policy.policy(arguments.guard),
-            is_strict: arguments.policy.strict,
             declared: Arc::new(arguments.declared.clone()),
             network,
             thread: arguments.thread,
@@ -140,6 +139,11 @@ impl Controller<'_> {
         self.guarded.note_acted(self.beats.has_acted.load(Ordering::Relaxed));
         self.guarded.check(now());
         self.end.is_asked() || now() >= self.until || self.beats.has_acted.load(Ordering::Relaxed)
+    }
+
+    /// Whether SubDevices have watchdogs that are too short for a takeover, and are refused for that.
+    fn refuses_watchdogs(&self) -> bool {
+        self.arguments.policy.strict && !self.events.short_watchdogs.is_empty()
     }
 
     /// Prints what has happened.
@@ -180,7 +184,7 @@ impl Controller<'_> {
     /// Prints events until the end comes.
     fn watch(&mut self, joined: &mut Joined) {
         let mut in_op = false;
-        while !self.is_over() && !joined.cycles.has_ended() {
+        while !self.is_over() && !self.refuses_watchdogs() && !joined.cycles.has_ended() {
             self.report_events();
             joined.watched.changes(now()).iter().for_each(|line| self.events.say(now(), line));
             let settled = self.supervisor.all_settled();
@@ -208,7 +212,7 @@ impl Controller<'_> {
         self.events.seen.handed_over = self.control.role() != MainDeviceRole::Active;
         if self.events.seen.handed_over {
             // Frames of the new ACTIVE arrive before this one leaves.
-            sleep(LAST_NEWS);
+            sleep(LAST_EVENTS);
             self.events.report(&self.supervisor, now());
             return None;
         }
@@ -251,6 +255,9 @@ impl Controller<'_> {
         }
         self.events.report(&self.supervisor, now());
         reasons.extend(self.switch_off()?);
+        if self.arguments.policy.strict {
+            reasons.append(&mut self.events.short_watchdogs);
+        }
         reasons.extend(self.events.reasons());
         reasons.extend(same_identity(&counters));
         say!("{}", in_line(&counters));

@@ -54,7 +54,11 @@ impl AcyclicHalf for SupervisorThread {
     }
 
     #[cfg(feature = "standby")]
-    fn watchdogs_within(&self, gap: Duration, cycle: Duration) -> Result<Vec<(SubDeviceId, Duration, Duration)>, Error> {
+    fn watchdogs_within(
+        &self,
+        gap: Duration,
+        cycle: Duration,
+    ) -> Result<Vec<(SubDeviceId, Duration, Duration)>, Error> {
         self.act(move |engine| engine.watchdogs_within(gap, cycle))
     }
 

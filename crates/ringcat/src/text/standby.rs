@@ -40,11 +40,11 @@ pub(super) fn describe(event: &Event, names: &Names) -> Option<String> {
             "the other MainDevice cannot follow: the knowledge of the segment has {bytes} bytes, at most {room}"
         ),
         StandbyEvent::NoActive { silence } => format!(
-            "ALARM: no ACTIVE for {:.3} ms, and this MainDevice does not take over",
+            "ALARM: no process data of an ACTIVE for {:.3} ms, and this MainDevice does not take over",
             silence.as_secs_f64() * 1e3
         ),
         StandbyEvent::WatchdogTooShort { subdevice, watchdog, needed } => format!(
-            "{}: its watchdog of {:.1} ms is shorter than a takeover may last ({:.1} ms): it leaves OP in one",
+            "{}: its watchdog of {:.1} ms is too short for a takeover, which may last {:.1} ms: it leaves OP in one",
             names.of(*subdevice),
             watchdog.as_secs_f64() * 1e3,
             needed.as_secs_f64() * 1e3

@@ -207,6 +207,24 @@ fn a_permanent_standby_follows_and_never_takes_over() {
     assert!(said.contains("result: ok: left as INACTIVE, takeovers: 0"), "{said}{errors}");
 }
 
+// covers: standby, 9.9
+#[test]
+fn a_watchdog_that_is_too_short_for_a_takeover_ends_a_controller_that_is_strict() {
+    let Some(mut pair) = Pair::new() else { return };
+    // The watchdogs of outputs have 100 ms: ten cycles and two more are longer.
+    let declared =
+        std::mem::replace(&mut pair.declared, ["--automatic", "--cycle", "10ms"].map(str::to_owned).to_vec());
+    let (said, errors) = pair.first(&["--strict"]).finish(LIMIT);
+    let reason = "its watchdog of 100.0 ms is too short for a takeover, which may last 120.0 ms: it leaves OP in one";
+    let last = said.lines().last().unwrap_or_default();
+    assert!(last.starts_with("result: FAILED: ") && last.contains(reason), "{said}{errors}");
+    pair.all_are_in("INIT");
+    pair.declared = declared;
+    let first = pair.first(&["--strict"]);
+    await_op(&pair.bench, 10);
+    end(first, &["stopped: outputs zero, all SubDevices in INIT"]);
+}
+
 // covers: standby, json, REQ010
 #[test]
 fn controllers_with_a_network_file_print_json_and_name_a_difference_of_the_files() {

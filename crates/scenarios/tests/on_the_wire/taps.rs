@@ -25,7 +25,7 @@ while True:
         c.sendall(piece)
 ";
 /// Sends numbers on one connection until its input ends, and checks their echoes.
-const TALKER: &str = "
+const CLIENT: &str = "
 import select, socket, struct, sys, time
 s = socket.create_connection(('192.168.7.1', 7000), timeout=20)
 print('connected', flush=True)
@@ -105,8 +105,8 @@ fn ping_and_tcp_over_the_taps_survive_twenty_switchovers() {
     taps.await_ready(0);
     let _server = Client::new(taps.pair.bench.start(Path::new("python3"), &["-c", SERVER]));
     taps.ping();
-    let talker = Client::new(taps.pair.bench.start_elsewhere(Path::new("python3"), &["-c", TALKER]));
-    assert_eq!(talker.line, "connected");
+    let client = Client::new(taps.pair.bench.start_elsewhere(Path::new("python3"), &["-c", CLIENT]));
+    assert_eq!(client.line, "connected");
     let mut active = 0;
     for _ in 0..SWITCHOVERS {
         let leaving = taps.controllers[active].take().expect("it runs");
@@ -118,7 +118,7 @@ fn ping_and_tcp_over_the_taps_survive_twenty_switchovers() {
         active = 1 - active;
     }
     taps.pair.all_are_in("OP");
-    let (is_whole, report) = talker.end();
+    let (is_whole, report) = client.end();
     assert!(is_whole, "{report}");
     print!("one TCP connection over {SWITCHOVERS} switchovers: {report}");
     let [first, second] = taps.controllers.map(|it| it.expect("it runs"));

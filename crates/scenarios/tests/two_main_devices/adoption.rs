@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use ringcat::standby::RoleRequest;
 use ringcat::standby::StandbyEvent;
+use ringcat::standby::{NotReady, Partner, RoleRequest};
 use ringcat::{Event, Limits, MainDeviceRole, SdoAddress, SubDeviceId};
 use ringcat_engine::mail::coe;
 use ringcat_sim::cable::{DeviceIndex, Host};
@@ -165,6 +165,36 @@ fn a_subdevice_gone_before_a_takeover_is_missing_one_that_goes_with_it_is_lost()
                 && two.controllers[1].engine.all_settled()
         });
     }
+}
+
+// covers: MR-18, MR-26, REQ032, standby
+#[test]
+fn an_active_that_is_started_again_is_followed_at_once_and_taken_over_through_init() {
+    let mut two = Two::in_op(ring_of_two(8, Host::First), declare, standby());
+    // Its count of cycles is far from the first one.
+    two.run(Duration::from_secs(1));
+    two.kill(0);
+    two.run(10 * CYCLE);
+    two.revive(0);
+    two.controllers[0].begin_active();
+    two.until(Duration::from_secs(5), "the ACTIVE is in OP again", |two| {
+        two.all_in_op() && two.controllers[0].engine.all_settled()
+    });
+    two.run(20 * CYCLE);
+    let [first, second] = &two.controllers;
+    assert_eq!(second.engine.states(), first.engine.states(), "{}", two.log());
+    // The other session has other logical addresses: nothing of it can be gone on with.
+    let partner = first.partner();
+    assert!(matches!(partner, Partner::Alive { not_ready, .. } if not_ready.has(NotReady::LAYOUT)), "{partner:?}");
+    two.mark();
+    two.kill(0);
+    two.controllers[1].request(RoleRequest::Active);
+    two.run(5 * CYCLE);
+    let is_warm = |event: &StandbyEvent| matches!(event, StandbyEvent::TookOver { is_hot: false, .. });
+    assert!(two.standby_events(1).iter().any(is_warm), "{:?}", two.standby_events(1));
+    two.until(Duration::from_secs(5), "all are in OP", |two| {
+        two.all_in_op() && two.controllers[1].engine.all_settled()
+    });
 }
 
 // covers: MR-26, REQ025, REQ026, standby

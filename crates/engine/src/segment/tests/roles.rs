@@ -18,7 +18,11 @@ fn a_round_of_reads_begins_after_a_role_that_ended_during_one() {
             ring.observe(Observation::Standby(StandbyObservation::Yielded));
         }
         let lives = [Life { presence: Presence::Settled, al_status: 8, code: 0 }; 4];
-        ring.observe(Observation::Standby(StandbyObservation::TookOver { lives: &lives, is_of_other: true, is_hot: true }));
+        ring.observe(Observation::Standby(StandbyObservation::TookOver {
+            lives: &lives,
+            is_of_other: true,
+            is_hot: true,
+        }));
         assert!(ring.cycle().iter().any(is_round), "its end was shown: {shows_end}");
     }
 }
