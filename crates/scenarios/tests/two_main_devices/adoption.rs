@@ -169,21 +169,21 @@ fn a_subdevice_gone_before_a_takeover_is_missing_one_that_goes_with_it_is_lost()
 
 // covers: MR-18, MR-26, REQ032, standby
 #[test]
-fn an_active_that_is_started_again_is_followed_at_once_and_taken_over_through_init() {
+fn an_active_that_is_started_again_is_followed_at_once_by_the_one_that_stayed() {
     let mut two = Two::in_op(ring_of_two(8, Host::First), declare, standby());
     // Its count of cycles is far from the first one.
-    two.run(Duration::from_secs(1));
+    two.run(Duration::from_secs(5));
     two.kill(0);
     two.run(10 * CYCLE);
     two.revive(0);
     two.controllers[0].begin_active();
-    two.until(Duration::from_secs(5), "the ACTIVE is in OP again", |two| {
+    two.until(Duration::from_secs(4), "the ACTIVE is in OP again", |two| {
         two.all_in_op() && two.controllers[0].engine.all_settled()
     });
     two.run(20 * CYCLE);
     let [first, second] = &two.controllers;
     assert_eq!(second.engine.states(), first.engine.states(), "{}", two.log());
-    // The other session has other logical addresses: nothing of it can be gone on with.
+    // Its session has other logical addresses: the application of the other one cannot go on with them.
     let partner = first.partner();
     assert!(matches!(partner, Partner::Alive { not_ready, .. } if not_ready.has(NotReady::LAYOUT)), "{partner:?}");
     two.mark();
