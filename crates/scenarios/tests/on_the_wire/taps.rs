@@ -25,7 +25,7 @@ while True:
         c.sendall(piece)
 ";
 /// Sends numbers on one connection until its input ends, and checks their echoes.
-const CLIENT: &str = "
+const TCP_CLIENT: &str = "
 import select, socket, struct, sys, time
 s = socket.create_connection(('192.168.7.1', 7000), timeout=20)
 print('connected', flush=True)
@@ -105,7 +105,7 @@ fn ping_and_tcp_over_the_taps_survive_twenty_switchovers() {
     taps.await_ready(0);
     let _server = Client::new(taps.pair.bench.start(Path::new("python3"), &["-c", SERVER]));
     taps.ping();
-    let client = Client::new(taps.pair.bench.start_elsewhere(Path::new("python3"), &["-c", CLIENT]));
+    let client = Client::new(taps.pair.bench.start_elsewhere(Path::new("python3"), &["-c", TCP_CLIENT]));
     assert_eq!(client.line, "connected");
     let mut active = 0;
     for _ in 0..SWITCHOVERS {
