@@ -106,9 +106,6 @@ mod options;
 mod pace;
 #[cfg(feature = "packet")]
 pub mod packet;
-// Further pages of docs, for their tests.
-#[cfg(doctest)]
-mod pages;
 mod parts;
 #[cfg(feature = "packet")]
 pub mod piped;

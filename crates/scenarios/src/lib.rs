@@ -29,6 +29,8 @@ pub mod namespaces;
 pub mod odd_images;
 pub mod once;
 pub mod one_buffer;
+#[cfg(doctest)]
+mod pages;
 pub mod pair;
 pub mod parts;
 pub mod phases;

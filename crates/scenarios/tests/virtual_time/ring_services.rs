@@ -291,7 +291,7 @@ fn an_lrw_of_a_file_is_refused_on_two_links_and_one_per_subdevice_is_allowed() {
     let several = || declare(vec![named(&[1]), named(&[2, 3])]);
     let error = World::with(0, segment(), &Options::default(), several()).expect_err("it was taken").to_string();
     let expected = "frame 1, command 2 \"cyclic cmd\": an LRW at logical address 0x01000000 of 12 bytes for \
-                    declarations [2, 3] cannot be used with two links";
+                    SubDevices [2, 3] cannot be used with two links";
     assert!(error.contains(expected), "{error}");
     // On one link it is allowed.
     let line = scenarios::segments::line(descriptions(&KINDS), NetworkOptions::default());

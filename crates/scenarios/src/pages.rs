@@ -1,4 +1,4 @@
-//! Pages of `docs` besides the guide: their examples are compiled, and run where they need no interface.
+//! Pages of `docs` besides the guide, which is in the package `ringcat`: their examples are compiled.
 
 #[doc = include_str!("../../../docs/eni.md")]
 mod eni {}
