@@ -123,8 +123,8 @@ impl Following {
         self.has_whole && self.whole.cycle.wrapping_sub(cycle) as i32 >= 0
     }
 
-    /// Whether another ACTIVE is followed since the last call, or the same one that has begun anew: what is known of the
-    /// one before counts no more.
+    /// Whether another ACTIVE is followed since the last call, or the same one that has begun anew: what is known of
+    /// the one before counts no more.
     pub fn take_anew(&mut self) -> bool {
         core::mem::take(&mut self.is_anew)
     }

@@ -175,7 +175,7 @@ fn a_takeover_before_the_first_cycle_as_inactive_has_the_states_of_the_other_one
 
 // covers: MR-18, MR-26, standby
 #[test]
-fn an_active_that_begins_anew_is_followed_at_once_and_what_was_before_does_not_count() {
+fn an_active_that_begins_anew_is_followed_at_once_without_what_was_before() {
     let mut duo = duo();
     (0..40).for_each(|_| duo.cycle());
     duo.first = Device::new(0x10, MainDeviceRole::Active, sizes(), (7, &[1]));
