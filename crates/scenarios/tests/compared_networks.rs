@@ -9,23 +9,12 @@ use ringcat::eni::EniFile;
 use ringcat::network::{LoadedNetwork, NetworkFile, ScanOptions};
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{Declaration, MainDevice, Options, Scan};
+use scenarios::dice::Dice;
 use scenarios::seeds;
 
 const PERIOD: Duration = Duration::from_millis(1);
 const LIMIT: Duration = Duration::from_secs(5);
 const TYPES: [&str; 5] = ["coupler", "digital-output-8", "digital-input-8", "analog-input-4", "servo"];
-
-/// A repeatable sequence of numbers (xorshift).
-struct Numbers(u64);
-
-impl Numbers {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 % limit as u64) as usize
-    }
-}
 
 /// A type, an alias, a serial number.
 type Unit = (&'static str, u16, u32);
@@ -51,11 +40,12 @@ fn reaches_op(main_device: MainDevice<SimulatedSegment>, declaration: Declaratio
 }
 
 /// One to three changes; a new unit has a serial number of its own.
-fn change(units: &mut Vec<Unit>, numbers: &mut Numbers) {
-    for count in 0..1 + numbers.below(3) {
-        let new = (TYPES[numbers.below(TYPES.len())], 0, 900 + count as u32);
-        let (at, other) = (numbers.below(units.len()), numbers.below(units.len()));
-        match numbers.below(4) {
+fn change(units: &mut Vec<Unit>, dice: &mut Dice) {
+    for count in 0..1 + dice.below(3) {
+        let new = (*dice.pick(&TYPES), 0, 900 + count as u32);
+        let places = units.len() as u64;
+        let (at, other) = (dice.below(places) as usize, dice.below(places) as usize);
+        match dice.below(4) {
             0 if units.len() > 1 => drop(units.remove(at)),
             1 => units.insert(at, new),
             2 => units.swap(at, other),
@@ -88,26 +78,27 @@ fn check(
 fn differences_are_marked_exactly_if_a_changed_bus_does_not_reach_op() {
     let mut failed = Vec::new();
     for seed in seeds::from_environment().unwrap_or(1..60) {
-        let mut numbers = Numbers((seed + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
-        let (has_aliases, has_serials) = (numbers.below(3) == 0, numbers.below(3) == 0);
-        let unit = |at: usize, numbers: &mut Numbers| {
-            let alias = if has_aliases && numbers.below(2) == 0 { 50 + at as u16 } else { 0 };
-            (TYPES[numbers.below(TYPES.len())], alias, 100 + at as u32)
+        let mut dice = Dice::new(seed);
+        let (has_aliases, has_serials) = (dice.one_in(3), dice.one_in(3));
+        let unit = |at: usize, dice: &mut Dice| {
+            let alias = if has_aliases && dice.one_in(2) { 50 + at as u16 } else { 0 };
+            (*dice.pick(&TYPES), alias, 100 + at as u32)
         };
-        let count = 1 + numbers.below(7);
-        let mut units: Vec<Unit> = (0..count).map(|at| unit(at, &mut numbers)).collect();
+        let count = 1 + dice.below(7);
+        let mut units: Vec<Unit> = (0..count).map(|at| unit(at as usize, &mut dice)).collect();
         let (_, scan) = scanned(&units);
         let mut options = ScanOptions::new("machine", PERIOD);
         (options.by_alias, options.check_serial) = (has_aliases, has_serials);
         let mut file = NetworkFile::from_scan(&scan.subdevices, &scan.topology, &options);
-        let eni = file.to_eni(&ExportOptions::default()).ok();
-        if eni.is_none() {
-            assert!(has_aliases, "seed {seed}");
-            file.subdevice.iter_mut().for_each(|it| it.optional = numbers.below(4) == 0);
-            file.required = [Required::All, Required::Mandatory][numbers.below(2)];
+        let mut eni = file.to_eni(&ExportOptions::default()).ok();
+        assert!(eni.is_some() || has_aliases, "seed {seed}");
+        if eni.is_none() || dice.one_in(2) {
+            eni = None;
+            file.subdevice.iter_mut().for_each(|it| it.optional = dice.one_in(4));
+            file.required = *dice.pick(&[Required::All, Required::Mandatory]);
         }
         let before = units.clone();
-        change(&mut units, &mut numbers);
+        change(&mut units, &mut dice);
         let network = LoadedNetwork::new(file);
         let by_file = check(&network.configuration, &network.stated(), network.declaration(), &units);
         failed.extend(by_file.err().map(|text| format!("seed {seed}: {before:?}, {text}")));
