@@ -117,8 +117,8 @@ impl Cyclic {
             writes: exchange.memory_write().is_some(),
             other_writes: exchange.memory_write_of_collided().is_some(),
         };
-        if let Some(notice) = watch.look_out(&situation, now) {
-            exchange.report_standby(notice.into());
+        if let Some(event) = watch.look_out(&situation, now) {
+            exchange.report_standby(event);
         }
         if let Some(request) = watch.decide(&situation, now)
             && let Some(control) = exchange.role_control()

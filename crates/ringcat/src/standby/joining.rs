@@ -4,13 +4,14 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use ringcat_engine::event::CyclicStandbyEvent;
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{ActivateError, Declaration, PartnerStatus};
 use ringcat_engine::role::{RoleControl, RoleRequest};
 use ringcat_engine::time::Instant;
 use ringcat_engine::{Scan, ScanError};
 
-use super::alarm::{Lookout, Notice};
+use super::alarm::Lookout;
 use super::policy::Dice;
 use super::{ForwardingCounters, NeedsTwoLinks, Policy};
 use crate::acyclic::Inline;
@@ -64,14 +65,14 @@ impl Joining {
     pub fn next<L: Links>(&mut self, main_device: &mut MainDevice<L>) -> Next {
         let has_link = Link::ALL.iter().any(|link| main_device.links.carrier(*link) != Some(false));
         let (partner, now) = (main_device.partner_status(), main_device.now());
-        if let Some(notice) = self.look_out(&partner, now) {
-            main_device.engine.report_standby(notice.into(), now);
+        if let Some(event) = self.look_out(&partner, now) {
+            main_device.engine.report_standby(event.event(|_| String::new()), now);
         }
         self.decide(&partner, has_link, now)
     }
 
     /// Whether an alarm is to be reported. One that becomes ACTIVE has time to do so.
-    pub(crate) fn look_out(&mut self, partner: &PartnerStatus, now: Instant) -> Option<Notice> {
+    pub(crate) fn look_out(&mut self, partner: &PartnerStatus, now: Instant) -> Option<CyclicStandbyEvent> {
         self.lookout.note(partner.at, self.limit.saturating_mul(if self.takes_over { 2 } else { 1 }), now)
     }
 

@@ -6,12 +6,13 @@
 
 use std::time::Duration;
 
+use ringcat_engine::event::CyclicStandbyEvent;
 use ringcat_engine::main_device::MainDeviceRole;
 use ringcat_engine::role::RoleRequest;
 use ringcat_engine::time::Instant;
 use ringcat_wire::frame::MacAddress;
 
-use super::alarm::{Lookout, Notice};
+use super::alarm::Lookout;
 
 /// Fewer cycles without process data may be those of a single fault of a cable.
 const LEAST_CYCLES: u32 = 3;
@@ -160,7 +161,7 @@ impl Watch {
     }
 
     /// Whether an alarm is to be reported in the cycle that begins now. One that takes over has time to do so.
-    pub fn look_out(&mut self, situation: &Situation, now: Instant) -> Option<Notice> {
+    pub fn look_out(&mut self, situation: &Situation, now: Instant) -> Option<CyclicStandbyEvent> {
         if situation.role == MainDeviceRole::Active {
             self.lookout.is_active(now);
             return None;

@@ -103,10 +103,10 @@ impl<C: Links> Listening<C> {
             }
             let has_link = self.supervisor.ring_status().links.iter().any(|link| link.carrier != Some(false));
             let (partner, now) = (self.listener.partner_status(), self.links.now());
-            if let Some(notice) = joining.look_out(&partner, now) {
+            if let Some(event) = joining.look_out(&partner, now) {
                 // It does not wait: frames have to be forwarded.
                 let _ = self.supervisor.begin(move |engine, _| {
-                    engine.report_standby(notice.into(), now);
+                    engine.report_standby(event.event(|_| String::new()), now);
                     Box::new(|_, _| true)
                 });
             }
