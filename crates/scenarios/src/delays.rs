@@ -4,6 +4,8 @@
 //! delay in every cycle. The true delays follow from the times at which the processing units received one frame, which
 //! only the simulator has. A delay is right, or it is not written and a reason is reported ([`Outcome`]).
 
+pub mod idle;
+
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -14,6 +16,7 @@ use ringcat_sim::controller::Wander;
 use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::frame::Port::{self, A, B, C, D};
 use ringcat_sim::network::Network;
+use ringcat_sim::time::SimTime;
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::map;
@@ -187,6 +190,15 @@ fn devices(count: usize, dice: &mut Dice) -> Vec<DeviceDescription> {
     all
 }
 
+/// Some SubDevices of a segment with gaps have no clock; at least one has a clock.
+fn remove_clocks(shape: Shape, devices: &mut [DeviceDescription], dice: &mut Dice) {
+    if shape == Shape::Gaps {
+        let keeps = dice.below(devices.len() as u64) as usize;
+        let without = devices.iter_mut().enumerate().filter(|(number, _)| *number != keeps);
+        without.filter(|_| dice.one_in(3)).for_each(|(_, device)| device.dc = None);
+    }
+}
+
 /// Runs a seed: a segment of this shape with this many changes.
 ///
 /// # Panics
@@ -195,12 +207,7 @@ pub fn run(shape: Shape, seed: u64, changes: u64) -> Outcome {
     let mut dice = Dice::new(seed);
     let plan = Plan::new(shape, &mut dice);
     let mut devices = devices(plan.devices, &mut dice);
-    if shape == Shape::Gaps {
-        // At least one has a clock.
-        let keeps = dice.below(devices.len() as u64) as usize;
-        let without = devices.iter_mut().enumerate().filter(|(number, _)| *number != keeps);
-        without.filter(|_| dice.one_in(3)).for_each(|(_, device)| device.dc = None);
-    }
+    remove_clocks(shape, &mut devices, &mut dice);
     let network = wired(devices, &plan.cables);
     let junctions = if plan.connections.is_empty() { JunctionMode::Disabled } else { JunctionMode::Strict };
     let options = Options::default().with_junctions(junctions);
@@ -364,17 +371,29 @@ fn from_known(truth: &[Place], hidden: &[usize]) -> Vec<Place> {
 
 /// Receive times of a frame at the processing units with a clock, relative to the first one on its link.
 fn truth(world: &mut World) -> Vec<Place> {
-    let latched =
-        |world: &World| -> Vec<_> { world.network().devices().map(|device| device.controller.latched()).collect() };
-    let before = latched(world);
-    let datagram = RawDatagram::new(Command::Bwr, Target::Broadcast(map::DC_RECEIVE_TIME), vec![0; 4]);
-    let work = world.application_mut().engine_mut().start_datagrams(vec![datagram]);
+    let before = latched(world.network());
+    let work = world.application_mut().engine_mut().start_datagrams(vec![spread_broadcast()]);
     let _ = world.finish(Duration::from_secs(1), work);
+    places(world.network(), &before)
+}
+
+/// The datagram with which all latch a frame.
+fn spread_broadcast() -> RawDatagram {
+    RawDatagram::new(Command::Bwr, Target::Broadcast(map::DC_RECEIVE_TIME), vec![0; 4])
+}
+
+/// The frame that each device has latched, and when.
+fn latched(network: &Network) -> Vec<Option<(u64, SimTime)>> {
+    network.devices().map(|device| device.controller.latched()).collect()
+}
+
+/// The devices that have latched another frame than before.
+fn places(network: &Network, before: &[Option<(u64, SimTime)>]) -> Vec<Place> {
     let mut met: Vec<(u64, u64, usize)> = Vec::new();
-    for (device, (now, before)) in latched(world).into_iter().zip(before).enumerate() {
-        let of = world.network().device(DeviceIndex(device));
+    for (device, (now, before)) in latched(network).into_iter().zip(before).enumerate() {
+        let of = network.device(DeviceIndex(device));
         // Unreachable devices keep their delay, devices without power lose it.
-        let counts = now != before && of.controller.is_powered() && of.description.dc.is_some();
+        let counts = now != *before && of.controller.is_powered() && of.description.dc.is_some();
         if let Some((frame, at)) = now.filter(|_| counts) {
             met.push((frame, at.0, device));
         }

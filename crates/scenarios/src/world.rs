@@ -442,7 +442,7 @@ impl Drop for World {
     }
 }
 
-fn station(device: &Device) -> u16 {
+pub(crate) fn station(device: &Device) -> u16 {
     let bytes = device.controller.register(map::STATION_ADDRESS, 2);
     u16::from_le_bytes([bytes[0], bytes[1]])
 }

@@ -7,7 +7,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use crate::topology::{PortOf, Topology};
+use crate::topology::{Closing, Finding, PortOf, Topology};
 
 /// Order in which a frame passes the ports; the processing unit is behind port 0 (protocol 2.1).
 const TRAVEL: [u8; 4] = [0, 3, 1, 2];
@@ -76,6 +76,27 @@ impl Wiring {
                 self.entries[1] = None;
             }
         }
+    }
+
+    /// The ports to close so that every whole ring is open: both ends of the closing cable of a ring behind a junction,
+    /// if frames enter all its members at port 0; the port of the redundant link in a closed ring of two links. With
+    /// several open ports, or an unconnected port 0, it is not known which one that is, as with unknown rings behind
+    /// junctions: a wrong one would cut off SubDevices.
+    pub fn whole_rings(
+        &self,
+        topology: &Topology,
+        ring_closed: bool,
+        enters_at_port_0: impl Fn(usize) -> bool,
+    ) -> Vec<PortOf> {
+        let is_whole = |closing: &Closing| {
+            let mut members = closing.head.node + 1..=closing.tail.node;
+            self.far(closing.head).is_some() && members.all(&enters_at_port_0)
+        };
+        let local = topology.local_rings.iter().map(|ring| ring.closing).filter(is_whole);
+        let ends = local.flat_map(|closing| [closing.head, closing.tail]);
+        let is_unclear = |finding: &Finding| matches!(finding, Finding::UnconnectedPort0 { .. });
+        let is_certain = topology.open_ports.len() == 1 && !topology.findings.iter().any(is_unclear);
+        ends.chain(self.entries[1].filter(|_| ring_closed && is_certain)).collect()
     }
 
     /// Number of SubDevices.
@@ -190,7 +211,7 @@ fn tree_root(topology: &Topology, mut node: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::topology::{Closing, LocalRing, Node};
+    use crate::topology::{LocalRing, Node};
 
     /// A junction with a local ring of three SubDevices from port 3 to port 1, and one SubDevice on port 2.
     fn junction() -> Topology {

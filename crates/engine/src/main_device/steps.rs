@@ -5,6 +5,8 @@
 use alloc::rc::Rc;
 use alloc::vec::Vec;
 
+use ringcat_wire::address::StationAddress;
+
 use super::MainDevice;
 use super::activate_error::ActivateError;
 use super::active::Active;
@@ -17,7 +19,8 @@ use crate::config::{Resolution, resolve};
 use crate::domain::DomainId;
 use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionError};
-use crate::procedures::junction::refute;
+use crate::procedures::idle::without_watch;
+use crate::procedures::junction::{Reached, refute};
 use crate::procedures::scan::node_status;
 use crate::role::Function;
 use crate::topology::{Closing, NodeStatus};
@@ -66,16 +69,20 @@ impl MainDevice {
     pub fn start_connection_check(&mut self) -> Pending<Result<(), JunctionError>> {
         let bus = self.supervisor.bus();
         let declared = self.declared_closings().unwrap_or_default();
-        let own = bus.clone();
+        let (own, segment) = (bus.clone(), self.segment.clone());
         Pending::start(&own, async move {
             if declared.closings.is_empty() {
                 return Ok(());
             }
             let closings: Vec<Closing> = declared.closings.iter().map(|(_, closing)| *closing).collect();
-            match refute(&bus, &declared.nodes, declared.main_count, &closings).await {
-                Some((number, shown)) => {
-                    Err(JunctionError::NotThere { connection: declared.closings[number].0, shown })
-                }
+            let connections: Vec<JunctionConnection> = declared.closings.iter().map(|(it, _)| *it).collect();
+            let testing = bus.clone();
+            let test = async move {
+                let reached = Reached { nodes: &declared.nodes, stations: &declared.stations };
+                refute(&testing, reached, declared.main_count, &closings).await
+            };
+            match without_watch(&bus, &segment, test).await.flatten() {
+                Some((number, shown)) => Err(JunctionError::NotThere { connection: connections[number], shown }),
                 None => Ok(()),
             }
         })
@@ -95,6 +102,7 @@ impl MainDevice {
         Some(DeclaredClosings {
             closings: loaded.connections.iter().filter_map(placed).collect(),
             nodes: scan.subdevices.iter().map(|info| node_status(info)).collect(),
+            stations: scan.stations(),
             main_count: scan.main_count,
         })
     }
@@ -130,5 +138,6 @@ impl MainDevice {
 struct DeclaredClosings {
     closings: Vec<(JunctionConnection, Closing)>,
     nodes: Vec<NodeStatus>,
+    stations: Vec<StationAddress>,
     main_count: usize,
 }

@@ -6,6 +6,7 @@
 //! station addresses that another program has written. Other frames are sent only after a change.
 
 mod changes;
+mod pause;
 mod places;
 mod rescue;
 mod state_turns;
@@ -23,7 +24,8 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlStatus, map};
 
-pub(crate) use changes::{nothing, scan_again};
+pub(crate) use changes::{are_ports_as_before, nothing, scan_again};
+pub(crate) use pause::without_watch;
 pub(crate) use rescue::rescue;
 
 use self::state_turns::StateTurns;

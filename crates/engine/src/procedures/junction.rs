@@ -12,6 +12,7 @@ mod orders;
 mod refute;
 
 pub(super) use self::isolate::isolate_rings;
+pub(crate) use self::learn::Reached;
 pub(super) use self::learn::learn;
 pub(super) use self::orders::note_controls;
 pub(crate) use self::orders::{UnderWay, ordering};

@@ -3,7 +3,10 @@
 //! They are restored to what the application orders by then: a port that it closes meanwhile stays closed. If the
 //! application ends meanwhile, they are restored before anything else is done; without a frame they expire.
 
+use alloc::format;
+use alloc::string::{String, ToString};
 use alloc::vec::Vec;
+use core::future::Future;
 use core::time::Duration;
 
 use ringcat_wire::address::{RegisterAddress, StationAddress, Wkc};
@@ -12,6 +15,7 @@ use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlControl, LoopControl, map};
 
 use super::shared_segment::SharedSegment;
+use crate::order::InOrder;
 use crate::ring::RingState;
 use crate::segment::Observation;
 use crate::supervisor::{Bus, BusError};
@@ -80,6 +84,48 @@ pub(super) async fn write(bus: &Bus, controls: Vec<(StationAddress, DlControl)>)
 /// The datagram with these settings.
 pub(super) fn write_of((station, control): (StationAddress, DlControl)) -> (Command, Target, Vec<u8>) {
     (Command::Fpwr, Target::Station(station, map::DL_CONTROL), control.encode()[..WRITTEN].to_vec())
+}
+
+/// Closes ports for a moment, in one frame, carries out `work`, and restores what the model says. `before`: the present
+/// settings of their SubDevices ([`controls`]). Returns an error, without `work`, if they could not be written.
+pub(super) async fn while_closed<T>(
+    bus: &Bus,
+    segment: &SharedSegment,
+    (before, ports): (&[(StationAddress, DlControl)], &[(StationAddress, u8)]),
+    work: impl Future<Output = T>,
+) -> Result<T, BusError> {
+    segment.observe(Observation::PortsAltered(before));
+    let closed = segment.view().altered().into_iter();
+    let closed = closed.map(|(station, control)| (station, closed_at(control, station, ports)));
+    let written = write(bus, closed.collect()).await;
+    let result = match written {
+        Ok(()) => Ok(work.await),
+        Err(error) => Err(error),
+    };
+    restore(bus, segment).await;
+    result
+}
+
+/// The present loop settings of the SubDevices that have these ports. An error if one of the ports is closed.
+pub(super) async fn controls(
+    bus: &Bus,
+    segment: &SharedSegment,
+    ports: &[(StationAddress, u8)],
+) -> Result<Vec<(StationAddress, DlControl)>, String> {
+    let mut stations: Vec<StationAddress> = ports.iter().map(|(station, _)| *station).collect();
+    stations.put_in_order();
+    stations.dedup();
+    let mut controls = Vec::new();
+    for station in stations {
+        let read = followed(bus, segment, station).await.map_err(|error| error.to_string())?;
+        let Some(control) = read else { return Err(format!("the ports of station {station} are being written")) };
+        let is_closed = |port: &u8| control.loops[usize::from(port & 3)] == LoopControl::Closed;
+        if ports.iter().any(|(of, port)| *of == station && is_closed(port)) {
+            return Err(format!("a port of station {station} that would be closed for a moment is closed already"));
+        }
+        controls.push((station, control));
+    }
+    Ok(controls)
 }
 
 /// Restores what is changed according to the model, if anything is. All in one frame: behind one end of a ring that is

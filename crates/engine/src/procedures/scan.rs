@@ -42,7 +42,7 @@ pub use self::stations::{FIRST_STATION, MAX_SUBDEVICES, station_at};
 use super::al_state;
 use super::dictionary::complete;
 use super::frame_limit::probe;
-use super::junction::learn;
+use super::junction::{Reached, learn};
 use super::services::ServiceError;
 use super::shared_segment::SharedSegment;
 use super::sii::program::SiiProgramError;
@@ -229,8 +229,12 @@ pub(super) async fn connect(
     main_count: usize,
 ) -> Result<Learned, BusError> {
     let statuses: Vec<NodeStatus> = subdevices.iter().map(node_status).collect();
+    let stations: Vec<StationAddress> = subdevices.iter().map(|info| info.station).collect();
     let closings = match junctions {
-        JunctionMode::Automatic => learn(bus, &statuses, main_count, bus.ring() == RingState::Closed).await?,
+        JunctionMode::Automatic => {
+            let reached = Reached { nodes: &statuses, stations: &stations };
+            learn(bus, reached, main_count, bus.ring() == RingState::Closed).await?
+        }
         JunctionMode::Disabled | JunctionMode::Strict => Vec::new(),
     };
     // With rings that were not learned, receive times would show crossed lines that do not exist.

@@ -75,6 +75,7 @@ mod own_objects;
 mod pair;
 mod part_sequences;
 mod places;
+mod port_delays;
 mod power_cycles;
 mod real_images;
 mod register_commands;

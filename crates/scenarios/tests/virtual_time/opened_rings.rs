@@ -7,7 +7,7 @@ use ringcat::{
     Application, ClockConfig, Error, JunctionMode, LastOutputs, MainDevice, Options, Pending, SubDeviceId, automatic,
 };
 use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
-use ringcat_sim::frame::Port::{A, B, D};
+use ringcat_sim::frame::Port::{A, B, C, D};
 use ringcat_sim::network::Network;
 use ringcat_wire::register::{DlControl, LoopControl, map};
 use scenarios::clocks::{clocked, wired};
@@ -26,7 +26,11 @@ const FORK: [(Endpoint, Endpoint); 5] =
     [(MAIN, at(0, A)), (at(0, B), at(1, A)), (at(1, D), at(2, A)), (at(1, B), at(3, A)), (at(3, B), at(4, A))];
 
 fn active(network: Network) -> Application<Tap> {
-    let options = Options::default().with_junctions(JunctionMode::Automatic);
+    active_in(JunctionMode::Automatic, network)
+}
+
+fn active_in(junctions: JunctionMode, network: Network) -> Application<Tap> {
+    let options = Options::default().with_junctions(junctions);
     let mut main_device = MainDevice::request(Tap::new(network), &options);
     let scan = main_device.scan().expect("it can be scanned");
     let declaration = automatic(&scan.subdevices, CYCLE).with_clocks(Some(ClockConfig::default()));
@@ -149,4 +153,37 @@ fn a_ring_that_is_open_when_the_application_ends_is_closed_again_first() {
 #[test]
 fn branches_that_are_closed_when_the_application_ends_are_opened_first() {
     assert!(end_after_each(fork) > 0, "no branch was closed");
+}
+
+/// The open port of an undeclared broken ring looks like the end of the ring of two links. Closing it would cut off the
+/// members behind the break.
+// covers: dc-delays, 2.2
+#[test]
+fn no_ring_is_opened_at_a_port_that_may_belong_to_an_unknown_ring() {
+    const CABLES: [(Endpoint, Endpoint); 6] = [
+        (MAIN, at(0, A)),
+        (at(0, B), at(1, A)),
+        (at(1, D), at(2, A)),
+        (at(2, B), at(3, A)),
+        (at(3, B), at(1, B)),
+        (at(1, C), REDUNDANT),
+    ];
+    for (junctions, cut, is_opened) in [
+        (JunctionMode::Disabled, Some(CableId(3)), false),
+        (JunctionMode::Disabled, Some(CableId(2)), false),
+        (JunctionMode::Automatic, None, true),
+    ] {
+        let mut network = wired(clocked(4, 50), &CABLES);
+        cut.into_iter().for_each(|cable| network.cut(cable));
+        network.advance_by(Duration::from_millis(1));
+        let mut application = active_in(junctions, network);
+        let (mut was_open, mut were_cut_off) = (false, false);
+        for _ in 0..8_000 {
+            cycles(&mut application, 1);
+            let controls = controls(application.links().network());
+            were_cut_off |= cut.is_some() && !controls[1..].iter().all(is_open);
+            was_open |= controls.iter().any(|control| control.temporary && !is_open(control));
+        }
+        assert_eq!((was_open, were_cut_off), (is_opened, false), "{junctions}, {cut:?}");
+    }
 }

@@ -14,15 +14,14 @@ use core::time::Duration;
 
 use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::datagram::Target;
-use ringcat_wire::register::{DlControl, DlStatus, LoopControl, map};
+use ringcat_wire::register::{DlStatus, map};
 
 use crate::clocks::wiring::{TREES, Wiring};
 use crate::clocks::{Cables, Disagreement, Latched, Measured, Measurements, Passage, Segment, branches, port_times};
 use crate::event::Subject;
 use crate::link::{Link, LinkSet};
-use crate::order::InOrder;
 use crate::procedures::latch::{self as frames, Pauses};
-use crate::procedures::loops::{closed_at, followed, restore, until_ring_is_closed, write};
+use crate::procedures::loops::{controls, until_ring_is_closed, while_closed};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::unassigned::view;
 use crate::ring::RingState;
@@ -155,7 +154,6 @@ async fn measure_open(
     let is_reached = |at: &&PortOf| branches.is_empty() || passed.contains(&at.node);
     let all: Vec<PortOf> = rings.iter().chain(branches).filter(is_reached).copied().collect();
     let ports: Vec<(StationAddress, u8)> = all.iter().map(|at| (survey.stations[at.node], at.port)).collect();
-    let text = |error: BusError| error.to_string();
     let asked_at = bus.now();
     let Some(turn) = segment.disturb(Disturbance::OpenByPort, LIMIT).await else {
         return Err("rings cannot be opened: another procedure needs their ports".to_string());
@@ -164,27 +162,18 @@ async fn measure_open(
         check_again(bus, segment, survey).await?;
     }
     let before = controls(bus, segment, &ports).await?;
-    segment.observe(Observation::PortsAltered(&before));
-    let closed = segment.view().altered().into_iter();
-    let closed = closed.map(|(station, control)| (station, closed_at(control, station, &ports)));
-    let result = match write(bus, closed.collect()).await {
-        Ok(()) => {
-            let mut open = survey.clone();
-            open.wiring.open(&[rings, branches].concat());
-            open.latched = None;
-            open.is_whole = branches.is_empty();
-            // The port at the end of a ring of two links is closed: frames on the redundant link do not return.
-            open.no_return = survey.is_closed.then_some(Link::Redundant);
-            take(bus, segment, &open).await.map(drop)
-        }
-        Err(error) => Err(text(error)),
-    };
-    restore(bus, segment).await;
+    let mut open = survey.clone();
+    open.wiring.open(&[rings, branches].concat());
+    open.latched = None;
+    open.is_whole = branches.is_empty();
+    // The port at the end of a ring of two links is closed: frames on the redundant link do not return.
+    open.no_return = survey.is_closed.then_some(Link::Redundant);
+    let result = while_closed(bus, segment, (&before, &ports), take(bus, segment, &open)).await;
     if survey.is_closed {
         until_ring_is_closed(bus).await;
     }
     drop(turn);
-    result
+    result.map_err(|error| error.to_string())?.map(drop)
 }
 
 /// Other procedures had their turn since the survey: a ring that is open elsewhere by now must not be opened.
@@ -211,22 +200,8 @@ async fn measure_branches(bus: &Bus, segment: &SharedSegment, survey: &Survey, r
 impl Survey {
     /// The ports to close so that every ring is open.
     fn whole_rings(&self) -> Vec<PortOf> {
-        let mut ports = Vec::new();
-        for ring in &self.topology.local_rings {
-            if self.wiring.far(ring.closing.head).is_some() && self.cables_are_whole(ring.closing) {
-                ports.extend([ring.closing.head, ring.closing.tail]);
-            }
-        }
-        if self.is_closed {
-            ports.extend(self.wiring.entries[1]);
-        }
-        ports
-    }
-
-    /// Whether frames enter all SubDevices of a local ring at port 0.
-    fn cables_are_whole(&self, closing: Closing) -> bool {
-        let mut members = closing.head.node + 1..=closing.tail.node;
-        members.all(|node| self.dl_status[node].ports[0].communication)
+        let enters_at_port_0 = |node: usize| self.dl_status[node].ports[0].communication;
+        self.wiring.whole_rings(&self.topology, self.is_closed, enters_at_port_0)
     }
 }
 
@@ -433,26 +408,4 @@ pub(super) async fn latch(
         return Err(BusError::Wkc { target, expected: answered, got: latches.answered });
     }
     Ok(Frame { sent_at: latches.sent_at, latched: read })
-}
-
-/// The present loop settings of the SubDevices that have these ports. An error if one of the ports is closed.
-async fn controls(
-    bus: &Bus,
-    segment: &SharedSegment,
-    ports: &[(StationAddress, u8)],
-) -> Result<Vec<(StationAddress, DlControl)>, String> {
-    let mut stations: Vec<StationAddress> = ports.iter().map(|(station, _)| *station).collect();
-    stations.put_in_order();
-    stations.dedup();
-    let mut controls = Vec::new();
-    for station in stations {
-        let read = followed(bus, segment, station).await.map_err(|error| error.to_string())?;
-        let Some(control) = read else { return Err(format!("the ports of station {station} are being written")) };
-        let is_closed = |port: &u8| control.loops[usize::from(port & 3)] == LoopControl::Closed;
-        if ports.iter().any(|(of, port)| *of == station && is_closed(port)) {
-            return Err(format!("a port of station {station} that would be closed for a moment is closed already"));
-        }
-        controls.push((station, control));
-    }
-    Ok(controls)
 }

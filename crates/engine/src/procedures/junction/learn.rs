@@ -13,12 +13,11 @@
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use ringcat_wire::address::{Position, StationAddress, Wkc};
+use ringcat_wire::address::{StationAddress, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlControl, LoopControl, map};
 
-use super::super::scan::station_at;
 use crate::order::InOrder;
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{Closing, NodeStatus, PortOf, Topology, candidates_with};
@@ -32,14 +31,21 @@ const TEMPORARY: Duration = Duration::from_millis(1_200);
 /// Bytes of DL_CONTROL that are written: forwarding rule and temporary bit, loops.
 const WRITTEN: usize = 2;
 
-/// The closing cables of all local rings, whole or broken; none if they cannot be determined. Every SubDevice has the
-/// station address of its position.
+/// SubDevices by position: their ports, and their station addresses.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reached<'a> {
+    pub nodes: &'a [NodeStatus],
+    pub stations: &'a [StationAddress],
+}
+
+/// The closing cables of all local rings, whole or broken; none if they cannot be determined.
 pub(in super::super) async fn learn(
     bus: &Bus,
-    nodes: &[NodeStatus],
+    reached: Reached<'_>,
     main_count: usize,
     ring_closed: bool,
 ) -> Result<Vec<Closing>, BusError> {
+    let Reached { nodes, .. } = reached;
     // With a ring that was not recognised, receive times would show crossed lines that do not exist.
     let untimed: Vec<NodeStatus> = nodes.iter().map(|node| NodeStatus { receive_times: None, ..*node }).collect();
     let (mut right, mut wrong) = (Vec::new(), Vec::new());
@@ -55,7 +61,7 @@ pub(in super::super) async fn learn(
         // Which SubDevices are behind a break depends on the inner rings, which are tested first.
         set.put_in_order_by_key(|closing| core::cmp::Reverse(closing.head.node));
         for closing in set.iter().filter(|closing| !right.contains(closing)).copied().collect::<Vec<_>>() {
-            match attempt(bus, nodes, &topology, closing).await? {
+            match attempt(bus, reached, &topology, closing).await? {
                 Tried::Right => right.push(closing),
                 Tried::Wrong { last_silent } => {
                     wrong.push(closing);
@@ -89,13 +95,13 @@ enum Tried {
 }
 
 /// Tests whether a ring closes here.
-async fn attempt(bus: &Bus, nodes: &[NodeStatus], topology: &Topology, closing: Closing) -> Result<Tried, BusError> {
+async fn attempt(bus: &Bus, reached: Reached<'_>, topology: &Topology, closing: Closing) -> Result<Tried, BusError> {
     let Closing { head, tail } = closing;
-    let broken = first_behind_break(nodes, topology, closing);
+    let broken = first_behind_break(reached.nodes, topology, closing);
     // SubDevices behind a break are reached through the closing cable only.
     let silent = |node: usize| broken.is_some_and(|first| topology.is_behind(node, first));
     let ports = if broken.is_some() { Vec::from([head]) } else { Vec::from([head, tail]) };
-    let Some(answers) = with_closed(bus, &ports, nodes.len()).await? else { return Ok(Tried::NoFrame) };
+    let Some(answers) = with_closed(bus, &ports, reached.stations).await? else { return Ok(Tried::NoFrame) };
     if answers.iter().enumerate().all(|(node, is)| *is != silent(node)) {
         return Ok(Tried::Right);
     }
@@ -111,19 +117,26 @@ pub(super) fn first_behind_break(nodes: &[NodeStatus], topology: &Topology, clos
     Some(first.far.node).filter(is_open)
 }
 
-/// Which of `count` SubDevices answer, by position, while these ports are closed; `None` if no frame returns then.
-pub(super) async fn with_closed(bus: &Bus, ports: &[PortOf], count: usize) -> Result<Option<Vec<bool>>, BusError> {
+/// Which SubDevices with these station addresses answer, by position, while these ports are closed; `None` if no frame
+/// returns then.
+pub(super) async fn with_closed(
+    bus: &Bus,
+    ports: &[PortOf],
+    stations: &[StationAddress],
+) -> Result<Option<Vec<bool>>, BusError> {
+    let of = |port: &PortOf| stations.get(port.node).map(|station| (*station, port.port));
+    let ports: Vec<(StationAddress, u8)> = ports.iter().filter_map(of).collect();
     let mut controls = Vec::new();
-    for port in ports {
-        controls.push(DlControl::decode(&bus.fprd_array(station(*port), map::DL_CONTROL).await?));
+    for (station, _) in &ports {
+        controls.push(DlControl::decode(&bus.fprd_array(*station, map::DL_CONTROL).await?));
     }
-    let close = ports.iter().zip(&controls).map(|(port, control)| (*port, closed(*control, port.port)));
+    let close = ports.iter().zip(&controls).map(|((station, port), control)| (*station, closed(*control, *port)));
     let result = match write(bus, close.collect()).await {
-        Ok(()) => answering(bus, count).await,
+        Ok(()) => answering(bus, stations).await,
         Err(error) => Err(error),
     };
     let before = |control: &DlControl| DlControl { temporary: false, ..*control };
-    let open = ports.iter().zip(&controls).map(|(port, control)| (*port, before(control)));
+    let open = ports.iter().zip(&controls).map(|((station, _), control)| (*station, before(control)));
     if result.is_err() || write(bus, open.collect()).await.is_err() {
         // Frames were lost, or one of the two SubDevices does not answer: the settings expire.
         bus.sleep(TEMPORARY).await;
@@ -132,17 +145,17 @@ pub(super) async fn with_closed(bus: &Bus, ports: &[PortOf], count: usize) -> Re
 }
 
 /// Which SubDevices answer, by position.
-async fn answering(bus: &Bus, count: usize) -> Result<Vec<bool>, BusError> {
+async fn answering(bus: &Bus, stations: &[StationAddress]) -> Result<Vec<bool>, BusError> {
     // If no frame returns at all, this detects it faster.
     bus.brd(map::TYPE, 1).await?;
-    let ports = bus.gather((0..count).map(|node| PortOf { node, port: 0 }), |bus, at| async move {
-        match bus.fprd(station(at), map::TYPE, 1).await {
+    let answers = bus.gather(stations.iter().copied(), |bus, station| async move {
+        match bus.fprd(station, map::TYPE, 1).await {
             Ok(_) => Ok(true),
             Err(BusError::Wkc { .. }) => Ok(false),
             Err(error) => Err(error),
         }
     });
-    ports.await.into_iter().collect()
+    answers.await.into_iter().collect()
 }
 
 fn closed(control: DlControl, port: u8) -> DlControl {
@@ -153,19 +166,16 @@ fn closed(control: DlControl, port: u8) -> DlControl {
     DlControl { temporary: true, loops, ..control }
 }
 
-fn station(port: PortOf) -> StationAddress {
-    station_at(Position(port.node as u16))
-}
-
 /// All in one frame: a second frame would be sent into a closed port.
-async fn write(bus: &Bus, controls: Vec<(PortOf, DlControl)>) -> Result<(), BusError> {
-    let target = |port: &PortOf| Target::Station(station(*port), map::DL_CONTROL);
-    let writes =
-        controls.iter().map(|(port, control)| (Command::Fpwr, target(port), control.encode()[..WRITTEN].to_vec()));
+async fn write(bus: &Bus, controls: Vec<(StationAddress, DlControl)>) -> Result<(), BusError> {
+    let target = |station: &StationAddress| Target::Station(*station, map::DL_CONTROL);
+    let writes = controls
+        .iter()
+        .map(|(station, control)| (Command::Fpwr, target(station), control.encode()[..WRITTEN].to_vec()));
     let expected = Wkc(1);
     let replies = bus.transfer_all(writes, Some(expected)).await?;
     match controls.iter().zip(&replies).find(|(_, reply)| reply.wkc() != expected) {
-        Some(((port, _), reply)) => Err(BusError::Wkc { target: target(port), expected, got: reply.wkc() }),
+        Some(((station, _), reply)) => Err(BusError::Wkc { target: target(station), expected, got: reply.wkc() }),
         None => Ok(()),
     }
 }

@@ -11,11 +11,10 @@
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use ringcat_wire::address::Position;
+use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::{DlStatus, map};
 
-use super::super::scan::station_at;
-use super::learn::{first_behind_break, with_closed};
+use super::learn::{Reached, first_behind_break, with_closed};
 use crate::junction::ClosingEvidence;
 use crate::order::InOrder;
 use crate::supervisor::Bus;
@@ -31,14 +30,14 @@ const PAUSE: Duration = Duration::from_millis(2);
 /// address of its position.
 pub(crate) async fn refute(
     bus: &Bus,
-    scanned: &[NodeStatus],
+    scanned: Reached<'_>,
     main_count: usize,
     closings: &[Closing],
 ) -> Option<(usize, ClosingEvidence)> {
     let mut last = None;
     for _ in 0..TRIES {
         let nodes = present_ports(bus, scanned).await?;
-        last = Some(attempt(bus, &nodes, main_count, closings).await?);
+        last = Some(attempt(bus, Reached { nodes: &nodes, ..scanned }, main_count, closings).await?);
         if present_ports(bus, scanned).await? != nodes {
             return None;
         }
@@ -48,7 +47,7 @@ pub(crate) async fn refute(
 
 async fn attempt(
     bus: &Bus,
-    nodes: &[NodeStatus],
+    Reached { nodes, stations }: Reached<'_>,
     main_count: usize,
     closings: &[Closing],
 ) -> Option<(usize, ClosingEvidence)> {
@@ -67,7 +66,7 @@ async fn attempt(
         let broken = if linked.len() == 2 { first_behind_break(nodes, &topology, closing) } else { None };
         let silent = |node: usize| broken.is_some_and(|first| topology.is_behind(node, first));
         let ports = if broken.is_some() { &linked[..1] } else { &linked[..] };
-        let shown = match with_closed(bus, ports, nodes.len()).await.ok()? {
+        let shown = match with_closed(bus, ports, stations).await.ok()? {
             Some(answers) => {
                 let odd = answers.iter().enumerate().find(|(node, answers)| **answers == silent(*node));
                 match odd.map(|(node, answers)| (node, *answers)) {
@@ -84,16 +83,18 @@ async fn attempt(
 }
 
 /// Present port states; `None` if not all SubDevices answer.
-async fn present_ports(bus: &Bus, scanned: &[NodeStatus]) -> Option<Vec<NodeStatus>> {
+async fn present_ports(bus: &Bus, scanned: Reached<'_>) -> Option<Vec<NodeStatus>> {
     // After frames of a link were lost for a while, the bus does not wait for that link until one has returned.
     for _ in 0..SCANS {
-        if bus.brd(map::TYPE, 1).await.is_ok_and(|counted| usize::from(counted.wkc().0) == scanned.len()) {
+        if bus.brd(map::TYPE, 1).await.is_ok_and(|counted| usize::from(counted.wkc().0) == scanned.nodes.len()) {
             break;
         }
         bus.sleep(PAUSE).await;
     }
-    let read = bus.gather(scanned.iter().copied().enumerate(), |bus, (node, before)| async move {
-        let bytes = bus.fprd_array(station_at(Position(node as u16)), map::DL_STATUS).await.ok()?;
+    let each: Vec<(StationAddress, NodeStatus)> =
+        scanned.stations.iter().copied().zip(scanned.nodes.iter().copied()).collect();
+    let read = bus.gather(each, |bus, (station, before)| async move {
+        let bytes = bus.fprd_array(station, map::DL_STATUS).await.ok()?;
         Some(NodeStatus { dl_status: DlStatus::decode(&bytes), receive_times: None, ..before })
     });
     read.await.into_iter().collect()

@@ -1,81 +1,76 @@
-//! A ring of two links that is open for a moment, without an application (protocol 2.2, 7.1).
+//! Rings that are open for a moment, without an application: of two links, and behind junctions (protocol 2.2, 7.1).
 
-use alloc::rc::Rc;
-use alloc::vec;
-use core::cell::RefCell;
+use alloc::vec::Vec;
 use core::future::Future;
-use core::time::Duration;
 
 use ringcat_wire::address::StationAddress;
-use ringcat_wire::register::LoopControl;
+use ringcat_wire::register::{DlStatus, map};
 
-use crate::procedures::loops::{closed_at, followed, restore, until_ring_is_closed, write};
+use crate::link::LinkSet;
+use crate::procedures::idle::{are_ports_as_before, without_watch};
+use crate::procedures::loops::{controls, until_ring_is_closed, while_closed};
 use crate::procedures::shared_segment::SharedSegment;
-use crate::segment::disturbance::Disturbance;
-use crate::segment::{IdleObservation, Observation, Segment};
+use crate::ring::RingState;
+use crate::segment::{IdleObservation, Segment};
 use crate::supervisor::Bus;
 
-/// Maximum wait for other procedures that need the ports, and for one of idle operation that works on the segment.
-const LIMIT: Duration = Duration::from_secs(5);
-
-/// Closes a port at the end of the ring, carries out `work`, and opens the port again, also if the caller no longer
-/// waits; `None` if that cannot be done now.
-pub(super) async fn while_open<T: 'static>(
-    bus: &Bus,
-    segment: &SharedSegment,
-    end: (StationAddress, u8),
-    work: impl Future<Output = T> + 'static,
-) -> Option<T> {
-    let (ended, result) = (bus.signal(), Rc::new(RefCell::new(None)));
-    let (own_bus, own_segment, own_ended, own_result) = (bus.clone(), segment.clone(), ended.clone(), result.clone());
-    bus.spawn(async move {
-        let opened = open(&own_bus, &own_segment, end, work).await;
-        *own_result.borrow_mut() = Some(opened);
-        own_ended.notify();
-    });
-    ended.until(|| result.borrow_mut().take()).await
+/// Rings that are opened.
+#[derive(Debug)]
+pub(super) struct Rings {
+    /// The ports at their ends.
+    pub ports: Vec<(StationAddress, u8)>,
+    /// The ports of all SubDevices before.
+    pub status: Vec<(StationAddress, DlStatus)>,
 }
 
-async fn open<T>(
+/// Closes the ports at the ends of rings, carries out `open`, opens the ports again and carries out `whole`, also if the
+/// caller no longer waits; `None` if that cannot be done now.
+pub(super) async fn while_open<T: 'static, U: 'static>(
     bus: &Bus,
     segment: &SharedSegment,
-    end: (StationAddress, u8),
-    work: impl Future<Output = T>,
-) -> Option<T> {
-    let _turn = segment.disturb(Disturbance::OpenByPort, LIMIT).await?;
-    let quiet = segment.until(|model| (!model.is_idle_busy() && !model.is_scanning()).then_some(()));
-    bus.within(LIMIT, quiet).await.ok()?;
+    rings: Rings,
+    open: impl Future<Output = T> + 'static,
+    whole: impl Future<Output = U> + 'static,
+) -> Option<(T, U)> {
+    let (own_bus, own_segment) = (bus.clone(), segment.clone());
+    let work = async move {
+        let opened = close_ports(&own_bus, &own_segment, &rings.ports, open).await?;
+        let closed = whole.await;
+        let is_as_before = clear_events(&own_bus, &own_segment, &rings.status).await;
+        if !is_as_before {
+            own_segment.observe_idle(IdleObservation::RescanAsked);
+        }
+        Some((opened, closed))
+    };
+    without_watch(bus, segment, work).await.flatten()
+}
+
+/// Clears the ECAT events of the ports: idle operation would scan again, and examine the rings. False if ports have
+/// changed besides.
+async fn clear_events(bus: &Bus, segment: &SharedSegment, before: &[(StationAddress, DlStatus)]) -> bool {
+    // An application finds the events itself.
     if segment.view().is_active() {
-        return None;
+        return true;
     }
-    segment.observe_idle(IdleObservation::Measuring);
-    let result = close_port(bus, segment, end, work).await;
-    segment.observe_idle(IdleObservation::Measured);
-    result
+    bus.brd(map::DL_STATUS, DlStatus::LEN).await.is_ok() && are_ports_as_before(bus, before).await.unwrap_or(false)
 }
 
-async fn close_port<T>(
+async fn close_ports<T>(
     bus: &Bus,
     segment: &SharedSegment,
-    (station, port): (StationAddress, u8),
+    ports: &[(StationAddress, u8)],
     work: impl Future<Output = T>,
 ) -> Option<T> {
-    let control = followed(bus, segment, station).await.ok()??;
-    if control.loops[usize::from(port & 3)] == LoopControl::Closed {
-        return None;
-    }
+    let before = controls(bus, segment, ports).await.ok()?;
     // An application or a scan may have begun meanwhile.
     let has_begun = |model: &Segment| model.is_active() || model.is_scanning();
     if has_begun(&segment.view()) {
         return None;
     }
-    segment.observe(Observation::PortsAltered(&[(station, control)]));
-    let closed = closed_at(control, station, &[(station, port)]);
-    let result = match write(bus, vec![(station, closed)]).await {
-        Ok(()) => Some(work.await),
-        Err(_) => None,
-    };
-    restore(bus, segment).await;
-    until_ring_is_closed(bus).await;
+    let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
+    let result = while_closed(bus, segment, (&before, ports), work).await.ok();
+    if is_closed {
+        until_ring_is_closed(bus).await;
+    }
     result
 }

@@ -2,7 +2,8 @@
 //! application (protocol 2.3 to 2.5, 7.1).
 //!
 //! Without an application frames are latched for the receive times, `SAMPLES` for a mean: a clock counts in steps of
-//! 10 ns. A frame passes each SubDevice of a closed ring only once, so a ring of two links is opened for this.
+//! 10 ns. A frame passes each SubDevice of a closed ring only once, so every ring is opened for this, of two links and
+//! behind junctions. Its cable times are those of the open ring, the delays those of the closed one.
 //! While an application is active its clocks own the latches: then the times are those of the last latched frame, and
 //! the delays those that were measured.
 
@@ -17,7 +18,7 @@ use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DcReceiveTimes, DlStatus, ErrorCounters, PortKind, map};
 
 use super::ServiceError;
-use super::open_ring::while_open;
+use super::open_ring::{Rings, while_open};
 use crate::clocks::{Cables, Latched, Measurements, Wiring};
 use crate::declared::{Address, SubDeviceId};
 use crate::link::{Link, LinkSet};
@@ -94,7 +95,8 @@ pub struct SubDevicePorts {
     pub ports: [PortReport; 4],
     /// Delay from the reference clock in nanoseconds; before an application is active, and without distributed clocks,
     /// from the first SubDevice with a clock. `None` without a clock, or if it is not known: with rings behind
-    /// junctions, and while the segment changes.
+    /// junctions that the scan does not know, behind forks without a clock, on the other link than the first clock, and
+    /// while the segment changes.
     pub delay_ns: Option<i64>,
     /// EPU_ERROR_COUNTER (0x030C); `None` if it does not answer.
     pub unit_errors: Option<u8>,
@@ -137,12 +139,28 @@ impl Known {
         let delays = is_active.then(|| measured().map(|clock| (clock.station, clock.delay_ns)).collect());
         Some(Known { stations, topology, kinds, has_clock, names, delays })
     }
+
+    /// Delays from the first clock. `cables`: times of cables; those that these frames show are added.
+    fn propagation(&self, wiring: &Wiring, samples: Vec<Sample>, cables: &mut Cables) -> Option<Vec<Option<i64>>> {
+        let reference = self.has_clock.iter().position(|clock| *clock)?;
+        let mut measurements = Measurements::new(wiring);
+        samples.into_iter().for_each(|sample| measurements.add(sample));
+        if measurements.count() == 0 || measurements.disagreement(reference).is_some() {
+            return None;
+        }
+        let passages = vec![Default::default(); self.stations.len()];
+        let segment = crate::clocks::Segment { wiring, stations: &self.stations, passages: &passages };
+        let delays = segment.propagation(&measurements.mean(reference), reference, cables);
+        if delays.is_guessed || delays.is_implausible || delays.is_contradictory || delays.is_shared {
+            return None;
+        }
+        Some((0..self.stations.len()).map(|node| delays.between(reference, node)).collect())
+    }
 }
 
 /// Registers of one SubDevice.
 struct Readings {
     ports: [PortRegisters; 4],
-    dl_status: DlStatus,
     unit_errors: u8,
 }
 
@@ -156,18 +174,75 @@ pub(crate) async fn read(bus: &Bus, segment: &SharedSegment) -> Result<Vec<SubDe
     }
     let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
     let samples = match known.delays {
-        Some(_) => Vec::new(),
-        None if is_closed => samples_of_ring(bus, segment, &known).await,
-        None => samples(bus, &known, None).await,
+        Some(_) => Samples::default(),
+        None => Samples::take(bus, segment, &known, is_closed).await,
     };
     let each: Vec<(StationAddress, bool)> =
         known.stations.iter().copied().zip(known.has_clock.iter().copied()).collect();
     let readings = bus.gather(each, |bus, (station, clock)| async move { one(&bus, station, clock).await.ok() }).await;
     let delays = match &known.delays {
         Some(delays) => known.stations.iter().map(|station| delays.get(station).copied()).collect(),
-        None => measured(&known, is_closed, &readings, samples),
+        None => samples.delays(&known).unwrap_or_else(|| vec![None; known.stations.len()]),
     };
     Ok(reports(&known, &readings, &delays, bus.links()))
+}
+
+/// Receive times of some frames without an application.
+#[derive(Default)]
+struct Samples {
+    /// The cables that the frames used.
+    wiring: Wiring,
+    whole: Vec<Sample>,
+    /// The ports that were closed so that every ring was open, and the frames meanwhile.
+    ends: Vec<PortOf>,
+    open: Vec<Sample>,
+}
+
+impl Samples {
+    /// `is_closed`: the ring of two links is closed.
+    async fn take(bus: &Bus, segment: &SharedSegment, known: &Rc<Known>, is_closed: bool) -> Samples {
+        let read = |bus: Bus, station: StationAddress| async move {
+            Some(DlStatus::decode(&bus.fprd_array(station, map::DL_STATUS).await.ok()?))
+        };
+        let status = bus.gather(known.stations.clone(), read).await;
+        let port = |at: PortOf| {
+            let status = status.get(at.node).copied().flatten();
+            status.map(|status| status.ports[usize::from(at.port & 3)])
+        };
+        let is_open = |at: PortOf| port(at).is_some_and(|port| port.communication && !port.loop_closed);
+        let enters = |node: usize| port(PortOf { node, port: 0 }).is_some_and(|port| port.communication);
+        let wiring = Wiring::new(&known.topology, is_closed, is_open);
+        let ends = wiring.whole_rings(&known.topology, is_closed, enters);
+        let place = |end: &PortOf| Some((*known.stations.get(end.node)?, end.port));
+        let ports: Vec<(StationAddress, u8)> = ends.iter().filter_map(place).collect();
+        if ports.is_empty() {
+            return Samples { wiring, whole: samples(bus, known, None).await, ..Samples::default() };
+        }
+        let status: Option<Vec<DlStatus>> = status.into_iter().collect();
+        let Some(status) = status else { return Samples::default() };
+        let rings = Rings { ports, status: known.stations.iter().copied().zip(status).collect() };
+        let no_return = is_closed.then_some(Link::Redundant);
+        let work = |no_return| {
+            let (own_bus, own) = (bus.clone(), known.clone());
+            async move { samples(&own_bus, &own, no_return).await }
+        };
+        match while_open(bus, segment, rings, work(no_return), work(None)).await {
+            Some((open, whole)) => Samples { wiring, whole, ends, open },
+            None => Samples::default(),
+        }
+    }
+
+    /// Delays from the first clock, by the mean of the frames. None unless all cables are measured one by one: those of
+    /// rings while they were open.
+    fn delays(self, known: &Known) -> Option<Vec<Option<i64>>> {
+        let Samples { mut wiring, whole, ends, open } = self;
+        let (closed, mut cables) = (wiring.clone(), Cables::default());
+        if !ends.is_empty() {
+            wiring.open(&ends);
+            known.propagation(&wiring, open, &mut cables)?;
+        }
+        known.propagation(&closed, whole, &mut cables)
+    }
 }
 
 /// Receive times of some frames. Copies on the link `no_return` do not return.
@@ -179,16 +254,6 @@ async fn samples(bus: &Bus, known: &Known, no_return: Option<Link>) -> Vec<Sampl
         samples.push(sample);
     }
     samples
-}
-
-/// The same in a closed ring, which is opened at its last port; none if it cannot be opened.
-async fn samples_of_ring(bus: &Bus, segment: &SharedSegment, known: &Rc<Known>) -> Vec<Sample> {
-    let end = Wiring::new(&known.topology, true, |_| true).entries[1];
-    let Some(end) = end.and_then(|end| Some((*known.stations.get(end.node)?, end.port))) else { return Vec::new() };
-    let (own_bus, own) = (bus.clone(), known.clone());
-    while_open(bus, segment, end, async move { samples(&own_bus, &own, Some(Link::Redundant)).await })
-        .await
-        .unwrap_or_default()
 }
 
 /// Receive times of one frame; none of SubDevices without a clock or without an answer.
@@ -229,7 +294,7 @@ async fn one(bus: &Bus, station: StationAddress, clock: bool) -> Result<Readings
         forwarded_errors: counters.forwarded[port],
         lost_links: counters.lost_link[port],
     };
-    Ok(Readings { ports: [0, 1, 2, 3].map(port), dl_status, unit_errors: counters.epu })
+    Ok(Readings { ports: [0, 1, 2, 3].map(port), unit_errors: counters.epu })
 }
 
 /// The first bytes of data; zeros where it is shorter.
@@ -237,32 +302,6 @@ fn bytes<const N: usize>(data: Option<&[u8]>) -> [u8; N] {
     let mut array = [0; N];
     array.iter_mut().zip(data.unwrap_or_default()).for_each(|(to, from)| *to = *from);
     array
-}
-
-/// Delays from the first clock, by the mean of latched frames. None unless all cables are measured one by one.
-fn measured(known: &Known, is_closed: bool, readings: &[Option<Readings>], samples: Vec<Sample>) -> Vec<Option<i64>> {
-    let is_open = |at: PortOf| {
-        let status = readings.get(at.node).and_then(Option::as_ref).map(|readings| readings.dl_status);
-        let port = status.map(|status| status.ports[usize::from(at.port & 3)]);
-        port.is_some_and(|port| port.communication && !port.loop_closed)
-    };
-    let nothing = vec![None; known.stations.len()];
-    let Some(reference) = known.has_clock.iter().position(|clock| *clock) else { return nothing };
-    let mut wiring = Wiring::new(&known.topology, is_closed, is_open);
-    let end: Vec<PortOf> = wiring.entries[1].filter(|_| is_closed).into_iter().collect();
-    wiring.open(&end);
-    let mut measurements = Measurements::new(&wiring);
-    samples.into_iter().for_each(|sample| measurements.add(sample));
-    if measurements.count() == 0 || measurements.disagreement(reference).is_some() {
-        return nothing;
-    }
-    let passages = vec![Default::default(); known.stations.len()];
-    let segment = crate::clocks::Segment { wiring: &wiring, stations: &known.stations, passages: &passages };
-    let delays = segment.propagation(&measurements.mean(reference), reference, &mut Cables::default());
-    if delays.is_guessed || delays.is_implausible || delays.is_contradictory || delays.is_shared {
-        return nothing;
-    }
-    (0..known.stations.len()).map(|node| delays.between(reference, node)).collect()
 }
 
 fn reports(

@@ -1,12 +1,17 @@
 //! Declared connections that do not exist (JR-05, JR-06): they are refused, even if open ports allow them; existing
 //! ones are accepted.
 
-use ringcat::{ActivateError, Error, JunctionConnection, JunctionError, JunctionMode, Options, SubDeviceId, automatic};
+use std::time::Duration;
+
+use ringcat::{
+    ActivateError, Error, JunctionConnection, JunctionError, JunctionMode, MainDevice, Options, SubDeviceId, automatic,
+};
 use ringcat_sim::cable::{CableId, Endpoint};
 use ringcat_sim::frame::Port::{A, B, C, D};
 use ringcat_sim::network::Network;
 use scenarios::dice::Dice;
 use scenarios::segments::{MAIN, REDUNDANT, RING_OF_THREE, TWO_RINGS, at, wired};
+use scenarios::tap::Tap;
 use scenarios::world::{CYCLE, World};
 
 use super::plans::Plan;
@@ -125,4 +130,43 @@ fn only_right_connections_of_random_segments_are_accepted() {
         wrong += 1;
     }
     assert!(taken > 8 && wrong > 5, "{taken}, {wrong}");
+}
+
+/// A SubDevice in front of the ring comes back with another address: addresses no longer follow the positions.
+// covers: JR-05, JR-06, junctions
+#[test]
+fn connections_are_checked_at_the_addresses_that_subdevices_have() {
+    const BRANCH: CableId = CableId(1);
+    let kinds = ["junction", "digital-input-8", "junction", "digital-output-8", "servo", "digital-input-8", "block"];
+    let cables = [
+        (MAIN, at(0, A)),
+        (at(0, D), at(1, A)),
+        (at(0, B), at(2, A)),
+        (at(2, D), at(3, A)),
+        (at(3, B), at(4, A)),
+        (at(4, B), at(5, A)),
+        (at(5, B), at(2, B)),
+        (at(2, C), at(6, A)),
+    ];
+    for broken in [None, Some(CableId(4))] {
+        for (tail, is_right) in [(5, true), (4, false), (6, false)] {
+            let mut network = wired(&kinds, &cables);
+            network.cut(BRANCH);
+            broken.into_iter().for_each(|cable| network.cut(cable));
+            let options = Options::default().with_idle_operation(true).with_junctions(JunctionMode::Strict);
+            let mut main_device = MainDevice::request(Tap::new(network), &options);
+            main_device.attend(Duration::from_secs(1));
+            assert_eq!(main_device.subdevices().len(), kinds.len() - 1);
+            main_device.links_mut().network_mut().heal(BRANCH);
+            main_device.attend(Duration::from_secs(1));
+            assert_eq!(main_device.subdevices().len(), kinds.len());
+            main_device.load(automatic(&main_device.subdevices(), CYCLE)).expect("it fits");
+            let declared = JunctionConnection::new(SubDeviceId(2), 1, SubDeviceId(tail), 1);
+            main_device.add_junction_connection(declared).expect("ports that exist");
+            let got = main_device.apply().map(drop).map_err(|refused| refused.error);
+            let is_refused =
+                matches!(got, Err(Error::Activate(ActivateError::Junction(JunctionError::NotThere { .. }))));
+            assert_eq!((got.is_ok(), is_refused), (is_right, !is_right), "{broken:?}, tail {tail}: {got:?}");
+        }
+    }
 }

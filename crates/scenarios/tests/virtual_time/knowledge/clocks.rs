@@ -173,12 +173,14 @@ fn locks(kind: &str, count: usize, starts: u64) -> [Vec<Duration>; 2] {
     [first_times, known_times]
 }
 
+/// Single times have a standard deviation of about 1.3 %, the means of twelve one of 0.4 %: a difference of 1 % is the
+/// limit.
 // covers: dc-lock, states
 #[test]
 fn known_clocks_of_a_tree_of_40_lock_as_fast_on_average() {
     let [first_times, known_times] = locks("tree", 40, 12);
     let sum = |times: &[Duration]| times.iter().sum::<Duration>();
-    assert!(sum(&known_times) <= sum(&first_times), "{first_times:?}, known {known_times:?}");
+    assert!(sum(&known_times) <= sum(&first_times).mul_f64(1.01), "{first_times:?}, known {known_times:?}");
 }
 
 /// One start in eight is slower, by the time that a lock takes again.

@@ -1,0 +1,44 @@
+//! Work on ports without an application: broadcasts pause, and no scan begins.
+
+use alloc::rc::Rc;
+use core::cell::RefCell;
+use core::future::Future;
+use core::time::Duration;
+
+use crate::procedures::shared_segment::SharedSegment;
+use crate::segment::IdleObservation;
+use crate::segment::disturbance::Disturbance;
+use crate::supervisor::Bus;
+
+/// Maximum wait for other procedures that need the ports, and for one of idle operation that works on the segment.
+const LIMIT: Duration = Duration::from_secs(5);
+
+/// Carries out work that closes ports for a moment, to its end also if the caller no longer waits. Broadcasts would show
+/// another segment meanwhile. `None` if it cannot be done now.
+pub(crate) async fn without_watch<T: 'static>(
+    bus: &Bus,
+    segment: &SharedSegment,
+    work: impl Future<Output = T> + 'static,
+) -> Option<T> {
+    let (ended, result) = (bus.signal(), Rc::new(RefCell::new(None)));
+    let (own_bus, own_segment, own_ended, own_result) = (bus.clone(), segment.clone(), ended.clone(), result.clone());
+    bus.spawn(async move {
+        let done = paused(&own_bus, &own_segment, work).await;
+        *own_result.borrow_mut() = Some(done);
+        own_ended.notify();
+    });
+    ended.until(|| result.borrow_mut().take()).await
+}
+
+async fn paused<T>(bus: &Bus, segment: &SharedSegment, work: impl Future<Output = T>) -> Option<T> {
+    let _turn = segment.disturb(Disturbance::OpenByPort, LIMIT).await?;
+    let quiet = segment.until(|model| (!model.is_idle_busy() && !model.is_scanning()).then_some(()));
+    bus.within(LIMIT, quiet).await.ok()?;
+    if segment.view().is_active() {
+        return None;
+    }
+    segment.observe_idle(IdleObservation::Measuring);
+    let result = work.await;
+    segment.observe_idle(IdleObservation::Measured);
+    Some(result)
+}
