@@ -1,6 +1,7 @@
 //! Errors of the layout of process data.
 
 use core::fmt;
+use core::time::Duration;
 
 use crate::declared::SubDeviceId;
 use ringcat_wire::datagram::MAX_DATA;
@@ -25,6 +26,15 @@ pub enum LayoutError {
         /// Number of frames needed.
         frames: usize,
     },
+    /// With MainDevice redundancy: the frames of a cycle do not fit into it at 100 Mbit/s.
+    CycleTooShort {
+        /// Time on the wire in a cycle in which all domains are exchanged, with master frames and one acyclic frame
+        /// (of 1,514 bytes with Ethernet between both); two passes of the other MainDevice, which forwards whole
+        /// frames, included.
+        needed: Duration,
+        /// The shortest period, times the number of cycles that may be under way.
+        period: Duration,
+    },
 }
 
 impl fmt::Display for LayoutError {
@@ -40,6 +50,13 @@ impl fmt::Display for LayoutError {
                 f,
                 "process data needs {frames} frames at once, at most {} may be in flight",
                 crate::ring::MAX_IN_FLIGHT
+            ),
+            LayoutError::CycleTooShort { needed, period } => write!(
+                f,
+                "the frames of a cycle take {} us on the wire, with master frames, one acyclic frame, and two passes \
+                 of the other MainDevice: they do not fit into {} us",
+                needed.as_nanos().div_ceil(1_000),
+                period.as_nanos() / 1_000
             ),
         }
     }

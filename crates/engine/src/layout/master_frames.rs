@@ -5,8 +5,10 @@
 //! frame; the other areas follow in a fixed order and are cut where a frame ends.
 
 use alloc::vec::Vec;
+use core::time::Duration;
 
 use ringcat_wire::datagram::{MAX_DATA, OVERHEAD};
+use ringcat_wire::frame::{ETHERCAT_HEADER_LEN, ETHERNET_HEADER_LEN, MIN_FRAME, frame_len, wire_time_ns};
 use ringcat_wire::master_frame::{Answer, Area, Diagnosis, DomainRecord, FragmentHead, Header, Lengths};
 
 use super::{Layout, LayoutError};
@@ -15,6 +17,8 @@ use crate::domain::DomainId;
 
 /// Room for datagrams in a frame.
 const ROOM: usize = MAX_DATA + OVERHEAD;
+/// Bytes of a frame in front of its datagrams.
+const HEADERS: usize = ETHERNET_HEADER_LEN + ETHERCAT_HEADER_LEN;
 /// Bytes of a fragment without its part of the area.
 const EACH: usize = OVERHEAD + FragmentHead::LEN;
 /// Fewer bytes of an area do not share a frame with others, unless they are all of it.
@@ -120,6 +124,27 @@ impl PlannedMasterFrames {
         Ok(planned)
     }
 
+    /// Whether a cycle holds its frames: those of all domains, master frames, and one acyclic frame of at most `acyclic`
+    /// bytes. Further acyclic frames take what is left of a cycle.
+    ///
+    /// # Errors
+    /// [`LayoutError::CycleTooShort`].
+    pub fn check_time(&self, layout: &Layout, acyclic: usize) -> Result<(), LayoutError> {
+        let fastest = layout.domains.iter().filter(|domain| domain.period > Duration::ZERO);
+        let Some(fastest) = fastest.min_by_key(|domain| domain.period) else { return Ok(()) };
+        let cyclic = layout.domains.iter().flat_map(|domain| &domain.frames);
+        let cyclic = cyclic.map(|frame| (HEADERS + frame.bytes()).max(MIN_FRAME));
+        let times: Vec<u64> = cyclic.chain(self.frame_lengths()).map(wire_time_ns).collect();
+        let on_wire = Duration::from_nanos(times.iter().sum::<u64>() + wire_time_ns(acyclic.max(MIN_FRAME)));
+        // The other MainDevice sends a frame on when it has all of it, twice if a cable is broken (protocol 9.9).
+        let needed = on_wire + 2 * Duration::from_nanos(times.iter().copied().max().unwrap_or_default());
+        let period = fastest.period * u32::from(fastest.under_way.max(1));
+        if on_wire > fastest.period || needed > period {
+            return Err(LayoutError::CycleTooShort { needed, period });
+        }
+        Ok(())
+    }
+
     /// Number of fragments.
     pub fn fragments(&self) -> usize {
         self.frames.iter().map(Vec::len).sum()
@@ -127,10 +152,12 @@ impl PlannedMasterFrames {
 
     /// Bytes of all frames, without FCS.
     pub fn bytes(&self) -> usize {
-        let of_frame = |frame: &Vec<PlannedFragment>| {
-            ringcat_wire::frame::frame_len(frame.iter().map(|it| it.length + FragmentHead::LEN))
-        };
-        self.frames.iter().map(of_frame).sum()
+        self.frame_lengths().sum()
+    }
+
+    fn frame_lengths(&self) -> impl Iterator<Item = usize> {
+        let of_frame = |frame: &Vec<PlannedFragment>| frame_len(frame.iter().map(|it| it.length + FragmentHead::LEN));
+        self.frames.iter().map(of_frame)
     }
 }
 
@@ -198,7 +225,7 @@ impl Cutter {
 
 #[cfg(test)]
 mod tests {
-    use core::time::Duration;
+    use std::string::ToString;
     use std::vec;
 
     use super::*;
@@ -289,5 +316,34 @@ mod tests {
         let sizes = MasterSizes { to_inactive: u16::MAX, to_active: u16::MAX, ..MasterSizes::default() };
         let error = PlannedMasterFrames::new(sizes, &layout(33, 1000), 33).unwrap_err();
         assert!(matches!(error, LayoutError::TooManyFrames { frames } if frames > 96), "{error}");
+    }
+
+    /// 1,000 bytes of process data and one master frame of about 730 bytes.
+    // covers: standby
+    #[test]
+    fn a_cycle_that_does_not_hold_its_frames_is_refused_with_the_time() {
+        let planned = |layout: &Layout| PlannedMasterFrames::new(MasterSizes::default(), layout, 10).unwrap();
+        let with_period = |us: u64| {
+            let mut layout = layout(10, 50);
+            layout.domains[0].period = Duration::from_micros(us);
+            layout
+        };
+        let error = |us: u64, acyclic: usize| {
+            let layout = with_period(us);
+            planned(&layout).check_time(&layout, acyclic).err()
+        };
+        let Some(LayoutError::CycleTooShort { needed, period }) = error(100, 0) else { panic!("it is refused") };
+        assert_eq!(period, Duration::from_micros(100));
+        let exactly = needed.as_nanos().div_ceil(1_000) as u64;
+        assert_eq!((error(exactly, 0), error(exactly - 1, 0).is_some()), (None, true));
+        // 1,514 bytes instead of the shortest frame of 60.
+        assert!(error(exactly, 1_514).is_some_and(|error| error.to_string().contains("us on the wire")));
+        assert_eq!(error(exactly + 117, 1_514), None);
+        // With two cycles under way only the frames of one have to fit into it.
+        let mut layout = with_period(exactly - 1);
+        layout.domains[0].under_way = 2;
+        assert_eq!(planned(&layout).check_time(&layout, 0), Ok(()));
+        layout.domains[0].period = Duration::from_micros(100);
+        assert!(planned(&layout).check_time(&layout, 0).is_err());
     }
 }

@@ -4,6 +4,7 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use ringcat_wire::al::AlState;
+use ringcat_wire::frame::MAX_FRAME;
 
 use super::MainDevice;
 use super::declaration::Declaration;
@@ -58,6 +59,7 @@ impl MainDevice {
         self.set_ethernet_period(layout.home().map_or(Duration::ZERO, |home| layout.domains[home].period));
         let Some(standby) = &mut self.standby else { return Ok(()) };
         let planned = PlannedMasterFrames::new(standby.options.sizes, layout, subdevices.member_count())?;
+        planned.check_time(layout, if standby.options.max_acyclic > 0 { MAX_FRAME } else { 0 })?;
         (standby.configuration, standby.session) = (configuration, Some(session));
         (standby.publish_at, standby.published) = ((Instant(0), Instant(0)), None);
         let lowest = |is_op_only: bool| if is_op_only { AlState::Op } else { AlState::SafeOp };
