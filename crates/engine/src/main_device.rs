@@ -36,6 +36,7 @@ mod lrw;
 mod mail;
 mod memories;
 mod messages;
+mod obstacles;
 mod options;
 #[cfg(feature = "standby")]
 mod partner_ethernet;
@@ -87,6 +88,7 @@ pub use image_memory::ImageMemory;
 #[cfg(feature = "standby")]
 pub use listener::{Listener, PartnerDiagnosis, PartnerStatus};
 pub use live_status::{LiveStatus, LostCopies, SegmentStatus, SubDeviceStatus, WkcShare};
+pub use obstacles::{obstacles, replaced_reference};
 pub use options::Options;
 pub use pending::Pending;
 pub use register_error::RegisterError;
