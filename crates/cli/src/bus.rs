@@ -71,7 +71,7 @@ pub struct Wanted {
 }
 
 impl BusArguments {
-    /// Scans. `declared` is the network that is expected, whose rings behind junctions are tested. `wanted` decides what
+    /// Scans. `declared` is the network that is expected: its rings behind junctions are tested. `wanted` decides what
     /// is read besides of a SubDevice, which goes to PREOP and back to INIT for it.
     pub fn scan(
         &self,

@@ -86,13 +86,7 @@ pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
             difference.text = names.annotate(&difference.text);
         }
     }
-    for difference in &differences {
-        let mark = if difference.prevents_op { '!' } else { ' ' };
-        let first = format!("{mark} {:<width$}", difference.kind.word(), width = KIND - 2);
-        for (number, line) in wrapped(&difference.text, WIDTH - KIND).iter().enumerate() {
-            say!("{}{line}", if number == 0 { first.clone() } else { " ".repeat(KIND) });
-        }
-    }
+    print(&differences);
     let names = configuration.names();
     let json = |it: &ringcat::eni::Difference| Difference {
         kind: it.kind.word().to_owned(),
@@ -121,6 +115,17 @@ pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
         Verdict::Failed(format!("{count} from the file, {preventing} of them prevent OP"))
     };
     Ok(Report { verdict, data })
+}
+
+/// A line for each difference, or several.
+fn print(differences: &[ringcat::eni::Difference]) {
+    for difference in differences {
+        let mark = if difference.prevents_op { '!' } else { ' ' };
+        let first = format!("{mark} {:<width$}", difference.kind.word(), width = KIND - 2);
+        for (number, line) in wrapped(&difference.text, WIDTH - KIND).iter().enumerate() {
+            say!("{}{line}", if number == 0 { first.clone() } else { " ".repeat(KIND) });
+        }
+    }
 }
 
 /// Warns of SubDevices whose modules the file names and that do not list theirs. Returns their positions.

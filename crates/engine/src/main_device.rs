@@ -26,6 +26,7 @@ mod handover;
 mod identity;
 mod idle;
 mod image_memory;
+mod lay_out;
 #[cfg(feature = "standby")]
 mod listen;
 #[cfg(feature = "standby")]

@@ -88,10 +88,14 @@ fn reaches_op(main_device: MainDevice<SimulatedSegment>, declaration: Declaratio
     application.wait_until_op(LIMIT).map_err(|error| error.to_string())
 }
 
+fn kind(dice: &mut Dice) -> &'static str {
+    TYPES[dice.below(TYPES.len() as u64) as usize]
+}
+
 /// One to three changes; a new unit has a serial number of its own.
 fn change(units: &mut Vec<Unit>, dice: &mut Dice) {
     for count in 0..1 + dice.below(3) {
-        let new = Unit { kind: *dice.pick(&TYPES), alias: 0, serial: 900 + count as u32, has_clock: dice.one_in(2) };
+        let new = Unit { kind: kind(dice), alias: 0, serial: 900 + count as u32, has_clock: dice.one_in(2) };
         let places = units.len() as u64;
         let (at, other) = (dice.below(places) as usize, dice.below(places) as usize);
         match dice.below(5) {
@@ -141,7 +145,7 @@ fn synchronize(file: &mut NetworkFile, (scan, units): (&Scan, &[Unit]), dice: &m
         // Without a list nothing shows that the modules differ.
         if unit.is_modular() {
             let own = if unit.kind.contains("0x00010001") { 0x1_0001 } else { 0x1_0002 };
-            it.startup = list_of(if dice.one_in(4) { 0x1_0001 } else { own });
+            it.startup = list_of(own);
         }
     }
 }
@@ -155,7 +159,7 @@ fn differences_are_marked_exactly_if_a_changed_bus_does_not_reach_op() {
         let (has_aliases, has_serials) = (dice.one_in(3), dice.one_in(3));
         let unit = |at: usize, dice: &mut Dice| {
             let alias = if has_aliases && dice.one_in(2) { 50 + at as u16 } else { 0 };
-            Unit { kind: *dice.pick(&TYPES), alias, serial: 100 + at as u32, has_clock: !dice.one_in(4) }
+            Unit { kind: kind(dice), alias, serial: 100 + at as u32, has_clock: !dice.one_in(4) }
         };
         let count = 1 + dice.below(7);
         let mut units: Vec<Unit> = (0..count).map(|at| unit(at as usize, &mut dice)).collect();
@@ -169,7 +173,10 @@ fn differences_are_marked_exactly_if_a_changed_bus_does_not_reach_op() {
         assert!(eni.is_some() || has_aliases || file.clocks.is_some(), "seed {seed}");
         if eni.is_none() || dice.one_in(2) {
             eni = None;
-            file.subdevice.iter_mut().for_each(|it| it.optional = dice.one_in(4));
+            // Of two alike the engine may take the other one as the absent one: its modules differ then.
+            for (it, unit) in file.subdevice.iter_mut().zip(&units) {
+                it.optional = !unit.is_modular() && dice.one_in(4);
+            }
             file.required = *dice.pick(&[Required::All, Required::Mandatory]);
         }
         let before = units.clone();

@@ -12,14 +12,12 @@ use super::activate_error::ActivateError;
 use super::active::Active;
 use super::areas::{Areas, Directory};
 use super::declaration::Declaration;
+use super::lay_out::lay_out;
 use super::live_status::LiveStatus;
 use super::loaded::Loaded;
-use super::lrw::{self, check_lrw};
+use super::lrw;
 use super::obstacles::replaced;
-use super::prepare::{
-    check_clocks, check_domains, domain_specs, match_declaration, members, plan_all, report_oddities, with_domain,
-    witnesses,
-};
+use super::prepare::{check_clocks, check_domains, match_declaration, members, plan_all, report_oddities, with_domain};
 use super::repeats;
 use crate::board::Board;
 use crate::config::ClockConfig;
@@ -161,26 +159,6 @@ impl MainDevice {
         self.activations = self.activations.wrapping_add(1);
         (self.activations - 1).wrapping_add((now.0 >> STEP_BITS) as u32)
     }
-}
-
-/// The domains, and the places of their process data. Policy of LRW and witnesses in `rules` are those of the
-/// declaration.
-pub(super) fn lay_out(
-    declaration: &Declaration,
-    plans: &[Areas],
-    found: &[Option<Rc<SubDeviceInfo>>],
-    rules: Rules<'_>,
-) -> Result<(Vec<DomainSpec>, Layout), ActivateError> {
-    let lrw = lrw::policy(declaration.lrw, &declaration.explicit_lrw, rules.links)?;
-    let specs = domain_specs(declaration, plans, lrw, rules.links)?;
-    check_lrw(lrw, &specs, rules.links)?;
-    let witnesses = witnesses(plans, found, &specs);
-    let rules = Rules { lrw, witnesses: &witnesses, ..rules };
-    let mut layout = Layout::with(&specs, rules).map_err(ActivateError::Layout)?;
-    if declaration.clocks.is_some() {
-        layout.add_clocks().map_err(ActivateError::Layout)?;
-    }
-    Ok((specs, layout))
 }
 
 /// Clocks of all SubDevices of the scan.

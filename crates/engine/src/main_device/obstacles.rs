@@ -1,5 +1,5 @@
-//! What an activation refuses, for comparisons with a scan that activate nothing. The checks are those of the activation
-//! ([`super::prepare`], [`super::activate`]); here all of them are made, where an activation ends at the first.
+//! What an activation refuses, for comparisons with a scan that activate nothing. The checks are those of the
+//! activation ([`super::prepare`], [`super::lay_out`]); here all are made, where an activation ends at the first.
 
 use alloc::rc::Rc;
 use alloc::vec;
@@ -7,9 +7,9 @@ use alloc::vec::Vec;
 
 use ringcat_wire::address::Position;
 
-use super::activate::lay_out;
 use super::activate_error::ActivateError;
 use super::declaration::Declaration;
+use super::lay_out::lay_out;
 use super::loaded::{check_connections, closing};
 use super::prepare::{check, check_domains, no_clock, plan_all, with_domain};
 use crate::config::{ReferenceClock, Resolution, resolve};

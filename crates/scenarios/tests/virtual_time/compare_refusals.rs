@@ -1,4 +1,4 @@
-//! `compare` names what an activation refuses besides places, identities and PDOs: clocks, rings, domains, LRW, modules.
+//! `compare` names what an activation refuses besides places, identities and PDOs: clocks, rings, domains, LRW.
 //! The same network is activated on the simulated bus, and has to reach OP exactly if no difference is marked.
 
 use std::path::Path;
@@ -325,7 +325,7 @@ fn control_bytes_of_an_eni_are_named_as_a_whole() {
 }
 
 /// `RevisionNo` is a required element: 0 where the file has none.
-// covers: network-file, eni-export
+// covers: network-file, eni-run
 #[test]
 fn an_eni_of_a_file_without_revisions_and_identities_has_no_difference() {
     for vendor in [true, false] {
