@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use ringcat::config::Configuration;
 use ringcat::esi::load_segment;
 use ringcat::sim::network::Network;
 use ringcat::simulated::SimulatedSegment;
 use ringcat::text::{Names, describe};
-use ringcat::{AlState, Event, Links, MainDevice, Options, Scan, SubDeviceInfo};
+use ringcat::{AlState, Event, JunctionError, Links, MainDevice, Options, Scan, SubDeviceInfo};
 
-use crate::descriptions::detected;
+use crate::descriptions::{Detected, detected};
 use crate::failure::Failure;
 use crate::interfaces::{InterfaceArguments, LinkNames, SourceAddress};
 use crate::oddities::SiiOddities;
@@ -52,6 +53,10 @@ pub struct Bus {
     pub firmware: Vec<Option<String>>,
     /// Idents of the modules in the slots of each SubDevice, where they were read.
     pub modules: Vec<Vec<u32>>,
+    /// The same where the list was read to its end.
+    pub lists: Vec<Option<Vec<u32>>>,
+    /// A declared ring behind a junction that does not close.
+    pub not_closed: Option<JunctionError>,
     /// Faults of the SIIs, which are to be printed.
     pub oddities: SiiOddities,
 }
@@ -66,13 +71,18 @@ pub struct Wanted {
 }
 
 impl BusArguments {
-    /// Scans. `wanted` decides what is read besides of a SubDevice, which goes to PREOP and back to INIT for it.
-    pub fn scan(&self, wanted: impl FnMut(&SubDeviceInfo) -> Wanted) -> Result<Bus, Failure> {
+    /// Scans. `declared` is the network that is expected: its rings behind junctions are tested. `wanted` decides what
+    /// is read besides of a SubDevice, which goes to PREOP and back to INIT for it.
+    pub fn scan(
+        &self,
+        declared: Option<&Configuration>,
+        wanted: impl FnMut(&SubDeviceInfo) -> Wanted,
+    ) -> Result<Bus, Failure> {
         if let Some(path) = &self.sim {
             let segment = load_segment(path)?;
             let links = SimulatedSegment::new(Network::from_description(segment)?);
             let ring = links.addresses().redundant.is_some();
-            return scan(links, &Options::default(), ring, wanted, print);
+            return scan(links, Options::default(), ring, (declared, wanted), print);
         }
         let interfaces = InterfaceArguments {
             links: LinkNames { main: self.main.clone().unwrap_or_default(), redundant: self.redundant.clone() },
@@ -83,7 +93,7 @@ impl BusArguments {
         let links = interfaces.open(self.thread)?;
         let mut surroundings = Surroundings::watch(&interfaces, &links);
         let _awake = self.thread.apply();
-        scan(links, &interfaces.options(), self.redundant.is_some(), wanted, |event| {
+        scan(links, interfaces.options(), self.redundant.is_some(), (declared, wanted), |event| {
             match surroundings.note(&event.event) {
                 None => print(event),
                 Some(words) => words.into_iter().for_each(warn),
@@ -101,12 +111,13 @@ fn print(event: &ringcat::TimedEvent) {
 
 fn scan<L: Links>(
     links: L,
-    options: &Options,
+    options: Options,
     ring: bool,
-    mut wanted: impl FnMut(&SubDeviceInfo) -> Wanted,
+    (declared, mut wanted): (Option<&Configuration>, impl FnMut(&SubDeviceInfo) -> Wanted),
     mut on_event: impl FnMut(&ringcat::TimedEvent),
 ) -> Result<Bus, Failure> {
-    let mut main_device = MainDevice::request(links, options);
+    let junctions = declared.map(|declared| declared.rings.junctions).unwrap_or_default();
+    let mut main_device = MainDevice::request(links, &options.with_junctions(junctions));
     let mut oddities = SiiOddities::default();
     let scan = main_device.scan_with(|event| {
         if !oddities.keep(event) {
@@ -114,15 +125,30 @@ fn scan<L: Links>(
         }
     });
     let scan = scan.inspect_err(|_| oddities.print(&[]))?;
-    let (mut firmware, mut modules) = (Vec::new(), Vec::new());
+    let not_closed = declared.and_then(|declared| not_closed(&mut main_device, declared));
+    let (mut firmware, mut modules, mut lists) = (Vec::new(), Vec::new(), Vec::new());
     for info in &scan.subdevices {
         let has_objects = info.protocols.coe() && info.mailbox.is_some();
         let wanted = if has_objects { wanted(info) } else { Wanted::default() };
-        let (version, idents) = read_besides(&mut main_device, info, wanted);
+        let (version, detected) = read_besides(&mut main_device, info, wanted);
         firmware.push(version);
-        modules.push(idents);
+        lists.push(detected.is_whole.then(|| detected.idents.clone()));
+        modules.push(detected.idents);
     }
-    Ok(Bus { scan, ring, firmware, modules, oddities })
+    Ok(Bus { scan, ring, firmware, modules, lists, not_closed, oddities })
+}
+
+/// A declared ring behind a junction that does not close, by the test of an activation.
+fn not_closed<L: Links>(main_device: &mut MainDevice<L>, declared: &Configuration) -> Option<JunctionError> {
+    if declared.rings.connections.is_empty() {
+        return None;
+    }
+    // What is wrong in the file is a difference of its own.
+    main_device.load(declared.declaration.clone()).ok()?;
+    for connection in &declared.rings.connections {
+        main_device.add_junction_connection(*connection).ok()?;
+    }
+    main_device.check_connections().err()
 }
 
 /// Version of the firmware and idents of modules, read in PREOP; it is in INIT afterwards. A SubDevice that does not
@@ -131,16 +157,16 @@ pub fn read_besides<L: Links>(
     main_device: &mut MainDevice<L>,
     info: &SubDeviceInfo,
     wanted: Wanted,
-) -> (Option<String>, Vec<u32>) {
+) -> (Option<String>, Detected) {
     if !wanted.firmware && !wanted.modules {
-        return (None, Vec::new());
+        return (None, Detected::default());
     }
     let position = info.position;
     let read = main_device.subdevice(position).request_state(AlState::PreOp).map(|()| {
         let firmware = wanted.firmware.then(|| main_device.subdevice(position).sdo_read::<String>(FIRMWARE, 0));
         let firmware = firmware.and_then(|read| read.map_err(warn).ok());
         if !wanted.modules {
-            return (firmware, Vec::new());
+            return (firmware, Detected::default());
         }
         let modules = detected(
             main_device,

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use clap::Args;
-use ringcat::config::{Configuration, FoundNetwork, ObjectNames, Stated};
+use ringcat::SubDeviceInfo;
+use ringcat::config::{Configuration, DeclaredPdos, FoundNetwork, ObjectNames, Stated};
 use ringcat::eni::EniFile;
 use ringcat::network::LoadedNetwork;
 
@@ -13,7 +14,7 @@ use crate::descriptions::{Descriptions, EsiArgument, complete};
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::network::{Compare, Difference};
-use crate::output::{counted, say};
+use crate::output::{counted, say, warn};
 use crate::verdict::{Report, Verdict};
 
 /// Columns of a line.
@@ -61,15 +62,22 @@ pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
     let with_firmware: BTreeSet<(u32, u32)> =
         stated.iter().filter(|it| !it.firmware.is_empty()).filter_map(|it| it.device).collect();
     let declared_pdos = configuration.declared_pdos(&stated);
-    let mut bus = arguments.bus.scan(|info| Wanted {
+    let mut bus = arguments.bus.scan(Some(&configuration), |info| Wanted {
         firmware: with_firmware.contains(&(info.identity.vendor_id, info.identity.product_code)),
-        modules: descriptions.as_mut().is_some_and(|it| it.has_modules(info)) || declared_pdos.are_unlisted(info),
+        modules: descriptions.as_mut().is_some_and(|it| it.has_modules(info))
+            || declared_pdos.are_unlisted(info)
+            || declared_pdos.have_modules(info),
     })?;
+    let unlisted = report_unlisted(&bus, &declared_pdos);
     mark_modular(&mut stated, &bus, descriptions.as_mut());
     let described = complete(descriptions.as_mut(), &mut bus.scan.subdevices, &bus.modules)?;
     bus.oddities.print(&described);
     let found = &bus.scan.subdevices;
-    let network = FoundNetwork { subdevices: found, topology: &bus.scan.topology, firmware: &bus.firmware };
+    let network = FoundNetwork::new(found, &bus.scan.topology)
+        .with_firmware(&bus.firmware)
+        .with_modules(&bus.lists)
+        .with_redundant(bus.ring)
+        .with_not_closed(bus.not_closed);
     let mut differences = configuration.differences(network, &stated);
     for difference in &mut differences {
         let of_file = difference.subdevice.and_then(|at| declared.get(at.0));
@@ -78,13 +86,7 @@ pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
             difference.text = names.annotate(&difference.text);
         }
     }
-    for difference in &differences {
-        let mark = if difference.prevents_op { '!' } else { ' ' };
-        let first = format!("{mark} {:<width$}", difference.kind.word(), width = KIND - 2);
-        for (number, line) in wrapped(&difference.text, WIDTH - KIND).iter().enumerate() {
-            say!("{}{line}", if number == 0 { first.clone() } else { " ".repeat(KIND) });
-        }
-    }
+    print(&differences);
     let names = configuration.names();
     let json = |it: &ringcat::eni::Difference| Difference {
         kind: it.kind.word().to_owned(),
@@ -98,16 +100,47 @@ pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
         declared: configuration.declaration.subdevices.len(),
         found: found.len(),
         differences: differences.iter().map(json).collect(),
+        modules_not_compared: unlisted.clone(),
     });
     let subdevices = counted(found.len(), "SubDevice", "SubDevices");
     let verdict = if differences.is_empty() {
-        Verdict::Held(format!("{subdevices}, as in the file"))
+        let but = match unlisted.len() {
+            0 => String::new(),
+            count => format!("; the modules of {count} are not compared"),
+        };
+        Verdict::Held(format!("{subdevices}, as in the file{but}"))
     } else {
         let preventing = differences.iter().filter(|it| it.prevents_op).count();
         let count = counted(differences.len(), "difference", "differences");
         Verdict::Failed(format!("{count} from the file, {preventing} of them prevent OP"))
     };
     Ok(Report { verdict, data })
+}
+
+/// A line for each difference, or several.
+fn print(differences: &[ringcat::eni::Difference]) {
+    for difference in differences {
+        let mark = if difference.prevents_op { '!' } else { ' ' };
+        let first = format!("{mark} {:<width$}", difference.kind.word(), width = KIND - 2);
+        for (number, line) in wrapped(&difference.text, WIDTH - KIND).iter().enumerate() {
+            say!("{}{line}", if number == 0 { first.clone() } else { " ".repeat(KIND) });
+        }
+    }
+}
+
+/// Warns of SubDevices whose modules the file names and that do not list theirs. Returns their positions.
+fn report_unlisted(bus: &Bus, declared: &DeclaredPdos) -> Vec<u16> {
+    let mut unlisted = Vec::new();
+    for (info, list) in bus.scan.subdevices.iter().zip(&bus.lists) {
+        if list.is_none() && declared.have_modules(info) {
+            let SubDeviceInfo { position, name, .. } = info;
+            warn(format!(
+                "position {position} \"{name}\": its modules are not compared: it does not list them (0xF050)"
+            ));
+            unlisted.push(position.0);
+        }
+    }
+    unlisted
 }
 
 /// Marks the SubDevices of the types that have modules on the bus, or slots in their descriptions.

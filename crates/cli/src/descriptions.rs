@@ -71,27 +71,44 @@ pub fn complete_by(
 ) -> Result<Vec<ObjectNames>, Failure> {
     let mut idents = Vec::new();
     if let Some(descriptions) = &mut descriptions {
-        idents.extend(found.iter().map(|info| match descriptions.has_modules(info) {
-            true => detected(
-                &mut supervisor.subdevice(info.position),
-                |subdevice, index| subdevice.sdo_read(index, 0).ok(),
-                |subdevice, index, slot| subdevice.sdo_read(index, slot).ok(),
-            ),
-            false => Vec::new(),
+        idents.extend(found.iter().map(|info| {
+            match descriptions.has_modules(info) {
+                true => {
+                    detected(
+                        &mut supervisor.subdevice(info.position),
+                        |subdevice, index| subdevice.sdo_read(index, 0).ok(),
+                        |subdevice, index, slot| subdevice.sdo_read(index, slot).ok(),
+                    )
+                    .idents
+                }
+                false => Vec::new(),
+            }
         }));
     }
     complete(descriptions, found, &idents)
 }
 
-/// Idents of the modules that a device detects, after the list in its dictionary, of which `count` reads the length of
-/// an object and `ident` an entry. Without a list there are none.
+/// The modules that a device detects.
+#[derive(Debug, Default)]
+pub struct Detected {
+    /// Their idents by slot, as far as they can be read.
+    pub idents: Vec<u32>,
+    /// There is a list, and it was read to its end.
+    pub is_whole: bool,
+}
+
+/// The modules that a device detects, after the list in its dictionary, of which `count` reads the length of an object
+/// and `ident` an entry. Without a list there are none.
 pub fn detected<D>(
     device: &mut D,
     count: impl Fn(&mut D, u16) -> Option<u8>,
     ident: impl Fn(&mut D, u16, u8) -> Option<u32>,
-) -> Vec<u32> {
-    let slots = 1..=count(device, MODULES).unwrap_or(0);
-    slots.map_while(|slot| ident(device, MODULES, slot)).collect()
+) -> Detected {
+    let count = count(device, MODULES);
+    let slots = 1..=count.unwrap_or(0);
+    let idents: Vec<u32> = slots.map_while(|slot| ident(device, MODULES, slot)).collect();
+    let is_whole = count.is_some_and(|count| usize::from(count) == idents.len());
+    Detected { idents, is_whole }
 }
 
 /// As [`complete`], without a report of what has no description.
@@ -210,6 +227,7 @@ impl Descriptions {
                         None => {
                             let mut shared = ObjectNames::default();
                             shared.add_described(described.device(), &modules, LANGUAGE);
+                            shared.add_modules(&described.esi.modules);
                             let shared = Arc::new(shared);
                             known.push((kind, shared.clone()));
                             shared

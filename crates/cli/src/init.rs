@@ -105,7 +105,7 @@ pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
     }
     let mut descriptions = arguments.esi.open()?;
     let begin = Instant::now();
-    let mut bus = arguments.bus.scan(|info| Wanted {
+    let mut bus = arguments.bus.scan(None, |info| Wanted {
         firmware: arguments.firmware,
         modules: descriptions.as_mut().is_some_and(|it| it.has_modules(info)),
     })?;

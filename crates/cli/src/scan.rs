@@ -76,7 +76,7 @@ pub fn run(arguments: &ScanArguments) -> Result<Report, Failure> {
     }
     let wanted = Wanted { firmware: false, modules: true };
     let mut modules = |info: &SubDeviceInfo| match descriptions.as_mut().is_some_and(|it| it.has_modules(info)) {
-        true => read_besides(&mut main_device, info, wanted).1,
+        true => read_besides(&mut main_device, info, wanted).1.idents,
         false => Vec::new(),
     };
     let idents: Vec<Vec<u32>> = scan.subdevices.iter().map(&mut modules).collect();

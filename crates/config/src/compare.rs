@@ -4,6 +4,7 @@
 //! [`Configuration::differences`] explains two networks: a SubDevice that is missing or additional is one difference,
 //! not a wrong identity of all behind it.
 
+mod activation;
 mod align;
 mod alike;
 mod assignment;
@@ -11,6 +12,7 @@ mod cables;
 mod contents;
 mod difference;
 mod marks;
+mod modules;
 mod moves;
 mod order;
 mod process_data;
@@ -90,10 +92,11 @@ impl Configuration {
     }
 
     /// Every difference between the network of a scan and the file: SubDevices that are missing, additional or at
-    /// another place, revision, serial number, PDOs, mailboxes, SyncManagers, ports, cables. `stated` are the
+    /// another place, revision, serial number, PDOs, modules, mailboxes, SyncManagers, ports, cables, clocks, rings.
+    /// `stated` are the
     /// [`Stated`] properties by the index of the SubDevice; it may be empty.
     pub fn differences(&self, network: FoundNetwork<'_>, stated: &[Stated]) -> Vec<Difference> {
-        let FoundNetwork { subdevices: found, topology, firmware } = network;
+        let FoundNetwork { subdevices: found, topology, firmware, modules, .. } = network;
         let names = self.names();
         let mut differences = Vec::new();
         let mut pairs = Vec::new();
@@ -103,17 +106,7 @@ impl Configuration {
         for place in places {
             match place {
                 Place::Both { config, info, moved } => {
-                    if let Some(text) = order.text(config, &names).filter(|_| moved) {
-                        differences.push(Difference {
-                            subdevice: Some(SubDeviceId(config)),
-                            position: Some(found[info].position),
-                            kind: DifferenceKind::Order,
-                            prevents_op: marks.fails(config)
-                                || order.other(config).is_some_and(|other| marks.fails(other))
-                                || order.shifted_with(config).any(|other| marks.fails(other)),
-                            text,
-                        });
-                    }
+                    differences.extend(order.difference(config, &names, &marks, &found[info]).filter(|_| moved));
                     let both = contents::Both {
                         config,
                         declared: &self.declaration.subdevices[config],
@@ -121,9 +114,14 @@ impl Configuration {
                         stated: stated.get(config),
                         info: &found[info],
                         firmware: firmware.get(info).and_then(Option::as_deref),
+                        modules: modules.get(info).and_then(Option::as_deref),
                         fails: marks.fails(config),
                     };
+                    let before = differences.len();
                     both.compare(&mut differences);
+                    if marks.is_absent(config) {
+                        differences[before..].iter_mut().for_each(|it| it.prevents_op = false);
+                    }
                     pairs.push((config, info));
                 }
                 Place::Missing { config } => {
@@ -137,6 +135,11 @@ impl Configuration {
         if !differences.iter().any(|difference| difference.kind == DifferenceKind::Order) {
             differences.extend(cables::compare(self, &pairs, found, topology));
         }
+        let position_of = |subdevice: SubDeviceId| {
+            let (_, info) = pairs.iter().find(|(config, _)| *config == subdevice.0)?;
+            Some(found[*info].position)
+        };
+        differences.extend(activation::differences(self, &network, &names, position_of));
         differences
     }
 

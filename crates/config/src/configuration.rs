@@ -11,6 +11,7 @@ use ringcat_engine::config::SubDeviceConfig;
 use ringcat_engine::declared::SubDeviceId;
 use ringcat_engine::info::Direction;
 use ringcat_engine::main_device::Declaration;
+use ringcat_engine::{JunctionConnection, JunctionMode};
 use ringcat_wire::address::StationAddress;
 
 use crate::eni::{Place, Port};
@@ -30,6 +31,20 @@ pub struct Configuration {
     pub cycle: Option<Duration>,
     /// Settings of the file that are not followed, with the reason.
     pub notices: Vec<Notice>,
+    /// Rings that the file declares.
+    pub rings: DeclaredRings,
+}
+
+/// Rings that a file declares.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct DeclaredRings {
+    /// The segment is a ring: it needs a redundant interface.
+    pub is_ring: bool,
+    /// Handling of rings behind junctions.
+    pub junctions: JunctionMode,
+    /// The closing cables of these rings.
+    pub connections: Vec<JunctionConnection>,
 }
 
 impl Configuration {

@@ -29,7 +29,7 @@ pub(crate) use subdevice::states;
 
 use ringcat_engine::main_device::Declaration;
 
-use crate::configuration::{Configuration, SubDeviceFacts};
+use crate::configuration::{Configuration, DeclaredRings, SubDeviceFacts};
 use crate::eni::{Eni, EniError};
 use notices::Notices;
 
@@ -62,5 +62,6 @@ pub fn follow(eni: &Eni) -> Result<Configuration, EniError> {
     declaration.domains = cyclic.domains;
     declaration.explicit_lrw = cyclic.explicit_lrw;
     let subdevices = facts.collect();
-    Ok(Configuration { declaration, subdevices, groups, image, cycle: cyclic.cycle, notices: notices.into_list(eni) })
+    let (cycle, notices) = (cyclic.cycle, notices.into_list(eni));
+    Ok(Configuration { declaration, subdevices, groups, image, cycle, notices, rings: DeclaredRings::default() })
 }

@@ -20,7 +20,9 @@ mod object_names;
 mod xml;
 
 pub use compare::{DeclaredPdos, Difference, DifferenceKind, FoundNetwork, Stated, StatedSyncManager};
-pub use configuration::{Configuration, ImageArea, ImageCopy, Notice, ProcessImage, SubDeviceFacts, Variable};
+pub use configuration::{
+    Configuration, DeclaredRings, ImageArea, ImageCopy, Notice, ProcessImage, SubDeviceFacts, Variable,
+};
 pub use export::{Export, ExportDetails, ExportError, ExportOptions, LeftOut, LrwUse, SubDeviceDetails, export};
 pub use follow::follow;
 pub use object_names::ObjectNames;

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use ringcat_engine::info::SubDeviceInfo;
 
 use crate::eni;
-use crate::esi::{Device, Dictionary, Object, PartsRoom, Pdo, PlacedModule, parts};
+use crate::esi::{Device, Dictionary, Module, Object, PartsRoom, Pdo, PlacedModule, parts};
 #[cfg(feature = "network")]
 use crate::network::model;
 
@@ -18,12 +18,15 @@ const MAX_NAMES: usize = 1 << 16;
 const MAX_NAME: usize = 256;
 /// Words in front of an index without a subindex that is that of an object.
 const BEFORE_INDEX: [&str; 2] = ["PDO ", "object "];
+/// The word in front of the ident of a module.
+const BEFORE_IDENT: &str = "module ";
 
 /// Names of the PDOs, entries and objects of a SubDevice.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ObjectNames {
     objects: BTreeMap<u16, String>,
     entries: BTreeMap<(u16, u8), String>,
+    modules: BTreeMap<u32, String>,
     shared: Option<Arc<ObjectNames>>,
 }
 
@@ -97,6 +100,15 @@ impl ObjectNames {
         }
     }
 
+    /// Adds the types of the modules of a description, by their idents.
+    pub fn add_modules(&mut self, modules: &[Module]) {
+        for module in modules {
+            if !self.is_full() {
+                add(self.modules.entry(module.ident), &module.kind);
+            }
+        }
+    }
+
     fn add_entries(&mut self, pdo: &Pdo, language: u32) {
         for entry in &pdo.entries {
             self.add_entry(entry.index.index, entry.sub_index, entry.name.in_language(language));
@@ -126,7 +138,7 @@ impl ObjectNames {
     }
 
     fn is_full(&self) -> bool {
-        self.objects.len() + self.entries.len() >= MAX_NAMES
+        self.objects.len() + self.entries.len() + self.modules.len() >= MAX_NAMES
     }
 
     fn add_object(&mut self, index: u16, name: &str) {
@@ -148,6 +160,12 @@ impl ObjectNames {
         own.or_else(|| self.shared.as_ref().and_then(|shared| shared.object(index)))
     }
 
+    /// The type of a module.
+    pub fn module(&self, ident: u32) -> Option<&str> {
+        let own = self.modules.get(&ident).map(String::as_str);
+        own.or_else(|| self.shared.as_ref().and_then(|shared| shared.module(ident)))
+    }
+
     /// The name of an entry, else that of its object.
     pub fn entry(&self, index: u16, sub_index: u8) -> Option<&str> {
         self.exact(index, sub_index).or_else(|| self.object(index))
@@ -159,7 +177,7 @@ impl ObjectNames {
     }
 
     /// A message about the SubDevice with the name behind each object that it mentions as `0x6060:00`, `PDO 0x1a00` or
-    /// `object 0x6060`.
+    /// `object 0x6060`, and behind each `module 0x0001a001`.
     pub fn annotate(&self, text: &str) -> String {
         let mut out = String::with_capacity(text.len());
         let mut rest = text;
@@ -167,6 +185,12 @@ impl ObjectNames {
             let (head, tail) = rest.split_at(at);
             out.push_str(head);
             let is_begin = !out.ends_with(is_word);
+            if let Some((ident, length)) = module_ident(tail).filter(|_| out.ends_with(BEFORE_IDENT)) {
+                out.push_str(&tail[..length]);
+                rest = &tail[length..];
+                quote(&mut out, self.module(ident).filter(|_| !rest.starts_with(" \"")));
+                continue;
+            }
             let Some((index, sub_index, length)) = mentioned(tail).filter(|_| is_begin) else {
                 out.push_str("0x");
                 rest = &tail[2..];
@@ -179,11 +203,7 @@ impl ObjectNames {
             };
             out.push_str(&tail[..length]);
             rest = &tail[length..];
-            if let Some(name) = name.filter(|_| is_object && !rest.starts_with(" \"")) {
-                out.push_str(" \"");
-                out.extend(name.escape_debug());
-                out.push('"');
-            }
+            quote(&mut out, name.filter(|_| is_object && !rest.starts_with(" \"")));
         }
         out.push_str(rest);
         out
@@ -200,8 +220,25 @@ fn add<K: Ord>(entry: Entry<'_, K, String>, name: &str) {
     }
 }
 
+/// Appends a name in quotation marks.
+fn quote(out: &mut String, name: Option<&str>) {
+    if let Some(name) = name {
+        out.push_str(" \"");
+        out.extend(name.escape_debug());
+        out.push('"');
+    }
+}
+
 fn is_word(character: char) -> bool {
     character.is_alphanumeric() || character == ':'
+}
+
+/// The ident of a module that a text begins with, and its length in it.
+fn module_ident(text: &str) -> Option<(u32, usize)> {
+    const LENGTH: usize = "0x12345678".len();
+    let digits = text.get(2..LENGTH).filter(|digits| digits.bytes().all(|digit| digit.is_ascii_hexdigit()))?;
+    let ends = !text[LENGTH..].starts_with(is_word);
+    u32::from_str_radix(digits, 16).ok().filter(|_| ends).map(|ident| (ident, LENGTH))
 }
 
 /// Index and subindex that a text begins with, and their length in it.
@@ -233,6 +270,7 @@ mod tests {
         names.add_entry(0, 0, "a gap");
         names.add_object(0x6060, "Modes of \"operation\"\n");
         names.add_object(0x1000, "");
+        names.modules.insert(0x1_A001, "csp axis".to_owned());
         names
     }
 
@@ -245,6 +283,10 @@ mod tests {
             ("0x6000:11 of 16 bits", "0x6000:11 \"Value\" of 16 bits"),
             ("0x6060:00: aborted", "0x6060:00 \"Modes of \\\"operation\\\"\": aborted"),
             ("object 0x6060", "object 0x6060 \"Modes of \\\"operation\\\"\""),
+            (
+                "slot 1: expected module 0x0001a001, got module 0x0001a002",
+                "slot 1: expected module 0x0001a001 \"csp axis\", got module 0x0001a002",
+            ),
             ("0x1a00:01 maps 0x6000:11", "0x1a00:01 \"AI Channel 1\" maps 0x6000:11 \"Value\""),
         ] {
             assert_eq!(names.annotate(text), expected);
@@ -262,6 +304,10 @@ mod tests {
             "PDO 0x1a001",
             "a0x6000:11",
             "object 0x1000",
+            "module 0x0001a0011",
+            "module 0x1a01",
+            "slot 0x0001a001",
+            "module 0x0001a001 \"csp axis\"",
             "PDO 0x1ä00",
             "0x6000:1ä",
         ] {

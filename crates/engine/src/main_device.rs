@@ -26,6 +26,7 @@ mod handover;
 mod identity;
 mod idle;
 mod image_memory;
+mod lay_out;
 #[cfg(feature = "standby")]
 mod listen;
 #[cfg(feature = "standby")]
@@ -36,6 +37,7 @@ mod lrw;
 mod mail;
 mod memories;
 mod messages;
+mod obstacles;
 mod options;
 #[cfg(feature = "standby")]
 mod partner_ethernet;
@@ -87,6 +89,7 @@ pub use image_memory::ImageMemory;
 #[cfg(feature = "standby")]
 pub use listener::{Listener, PartnerDiagnosis, PartnerStatus};
 pub use live_status::{LiveStatus, LostCopies, SegmentStatus, SubDeviceStatus, WkcShare};
+pub use obstacles::{obstacles, replaced_reference};
 pub use options::Options;
 pub use pending::Pending;
 pub use register_error::RegisterError;

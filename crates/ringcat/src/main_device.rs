@@ -4,7 +4,6 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-use ringcat_engine::JunctionConnection;
 use ringcat_engine::config::SubDeviceConfig;
 use ringcat_engine::domain::DomainId;
 use ringcat_engine::event::TimedEvent;
@@ -14,6 +13,7 @@ use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{ActivateError, Declaration, MainDevice as Engine, Pending};
 use ringcat_engine::time::Instant;
 use ringcat_engine::{AcyclicCounters, RingInspection, Scan, inspect_ring};
+use ringcat_engine::{JunctionConnection, JunctionError};
 
 use crate::acyclic::{Inline, carry_out_link_order, log_messages};
 use crate::application::Application;
@@ -207,6 +207,16 @@ impl<L: Links> MainDevice<L> {
         Ok(self.engine.add_junction_connection(connection).map_err(ActivateError::Junction)?)
     }
 
+    /// Before the last step, which does the same: tests whether the added rings close as declared. Nothing is
+    /// configured.
+    ///
+    /// # Errors
+    /// [`JunctionError::NotThere`]: a ring does not close as declared.
+    pub fn check_connections(&mut self) -> Result<(), JunctionError> {
+        let check = self.engine.start_connection_check();
+        self.finish(check)
+    }
+
     /// Last step: lays out process data, starts the configuration of all SubDevices, and returns the running
     /// application.
     ///
@@ -215,8 +225,7 @@ impl<L: Links> MainDevice<L> {
     /// tested). The error contains the MainDevice; the declaration stays loaded.
     pub fn apply(mut self) -> Result<Application<L>, Box<Refused<MainDevice<L>>>> {
         let window = Arc::new(Window::new(self.acyclic_bytes));
-        let check = self.engine.start_connection_check();
-        let checked = self.finish(check).map_err(ActivateError::Junction);
+        let checked = self.check_connections().map_err(ActivateError::Junction);
         match checked.and_then(|()| self.engine.apply()) {
             Ok(active) => Ok(Application::new(self.links, Inline::new(self.engine), active, window)),
             Err(error) => Err(Box::new(Refused { error: error.into(), main_device: self })),

@@ -37,7 +37,7 @@ fn scan_of(text: &str, folder: &Path, devices: &EsiDevices) -> Result<Scan, Stri
 }
 
 fn differences(configuration: &Configuration, stated: &[Stated], scan: &Scan) -> Result<(), String> {
-    let found = FoundNetwork { subdevices: &scan.subdevices, topology: &scan.topology, firmware: &[] };
+    let found = FoundNetwork::new(&scan.subdevices, &scan.topology);
     let found: Vec<Difference> = configuration.differences(found, stated);
     let texts: Vec<&str> = found.iter().map(|it| it.text.as_str()).collect();
     if texts.is_empty() { Ok(()) } else { Err(texts.join("; ")) }

@@ -36,6 +36,8 @@ pub struct Compare {
     pub found: usize,
     /// The differences, in the order of the file
     pub differences: Vec<Difference>,
+    /// Positions of SubDevices whose modules the file names, and that do not list theirs
+    pub modules_not_compared: Vec<u16>,
 }
 
 /// A difference.
@@ -43,9 +45,9 @@ pub struct Compare {
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Difference {
     /// missing, additional, order, device, revision, serial, identification, pdos, mailbox, protocols, sync manager,
-    /// ports, process data, firmware or cable
+    /// ports, process data, firmware, cable, modules, clocks or ring
     pub kind: String,
-    /// Index of the SubDevice in the file, from 0; null for one that is not in it
+    /// Index of the SubDevice in the file, from 0; null for one that is not in it, and for a ring
     pub subdevice: Option<usize>,
     /// Its name in the file; null for one that is not in it
     pub name: Option<String>,

@@ -51,6 +51,79 @@ fn another_assignment_of_a_device_with_coe_is_named_in_both_directions() {
     assert!(folded(&differs).contains(expected) && !differs.out.contains('!'), "{}", differs.all());
 }
 
+/// Modules are compared by slot: with the names of the description, by network file and by ENI. A device without a list
+/// is named.
+// covers: network-file, ES-69, ES-70
+#[test]
+fn modules_that_are_not_those_of_the_file_are_named_by_slot() {
+    let place = Place::new("modules");
+    let acme = descriptions(&place, str::to_owned);
+    let text = fs::read_to_string(&acme).expect("it is readable");
+    place.write("unlisted.xml", &text.replace(" DownloadModuleIdentList=\"1\"", ""));
+    let bus = |file: &str, modules: &str| {
+        let text = format!("[[device]]\nesi = \"{file}\"\ntype = \"AM01\"\nmodules = [{modules}]\n");
+        place.write("bus.toml", &text)
+    };
+    let (out, eni) = (place.path("machine.toml"), place.path("machine.eni.xml"));
+    let modules = ["--module", "csp axis", "--module", "-", "--module", "status axis"];
+    let declare = [&["esi", "declare", &acme, "--type", "AM01", "--out", &out][..], &modules].concat();
+    assert_eq!(ringcat(&declare).code, Some(0));
+    assert_eq!(ringcat(&["eni", "export", "--network", &out, "--out", &eni]).code, Some(0));
+    let both = [["--network", &out], ["--eni", &eni]];
+    let same = bus("acme.xml", "\"csp axis\", \"-\", \"status axis\"");
+    let compare = |file: &[&str; 2], more: &[&str]| ringcat(&[&["compare", "--sim", &same][..], file, more].concat());
+    for file in &both {
+        let said = compare(file, &[]);
+        assert_eq!(said.verdict(), "result: ok: 1 SubDevice, as in the file", "{}", said.all());
+    }
+    bus("acme.xml", "\"csp axis\"");
+    for file in &both {
+        let said = compare(file, &[]);
+        let expected = "slot 3: expected module 0x00010002, got no module";
+        assert!(said.out.starts_with("! modules") && folded(&said).contains(expected), "{}", said.all());
+        let named = folded(&compare(file, &["--esi", &acme]));
+        assert!(named.contains("slot 3: expected module 0x00010002 \"status axis\", got no module"), "{named}");
+    }
+    bus("unlisted.xml", "\"csp axis\"");
+    let said = compare(&both[0], &[]);
+    let verdict = "result: ok: 1 SubDevice, as in the file; the modules of 1 are not compared";
+    assert_eq!(said.verdict(), verdict, "{}", said.all());
+    assert!(said.all().contains("its modules are not compared: it does not list them (0xF050)"), "{}", said.all());
+    let json = compare(&both[0], &["--json"]).out;
+    assert!(json.contains("\"modules_not_compared\":[0]"), "{json}");
+}
+
+/// As `run` and the activation decide: a ring on one interface, and a closing cable that is not there.
+// covers: network-file, junctions
+#[test]
+fn rings_that_do_not_exist_are_named() {
+    let place = Place::new("rings");
+    let ring = include_str!("../../../sim/segments/junction-ring.toml");
+    let (bus, out) = (place.write("bus.toml", ring), place.path("machine.toml"));
+    assert_eq!(ringcat(&["init", "--sim", &bus, "--out", &out]).code, Some(0));
+    let made = place.read("machine.toml");
+    let compare = |redundancy: &str| {
+        let network = place.write("changed.toml", &format!("{made}\n[redundancy]\n{redundancy}"));
+        ringcat(&["compare", "--sim", &bus, "--network", &network])
+    };
+    let to = |tail: &str| {
+        format!(
+            "junctions = \"strict\"\n[[redundancy.connection]]\nhead = \"junction\"\nhead_port = 1\ntail = \"{tail}\"\n\
+             tail_port = 1\n"
+        )
+    };
+    assert_eq!(compare(&to("block 3")).code, Some(0));
+    for (redundancy, expected) in [
+        (to("block 2"), "! ring junction connection 1:1-3:1: SubDevice 3 port 1 does not lead back to"),
+        ("ring = true\n".to_owned(), "! ring the file declares a ring (redundancy.ring), and the network is a line"),
+    ] {
+        let said = compare(&redundancy);
+        assert!(folded(&said).starts_with(expected), "{}", said.all());
+        let verdict = "result: FAILED: 1 difference from the file, 1 of them prevent OP";
+        assert_eq!(said.verdict(), verdict, "{}", said.all());
+    }
+}
+
 /// The EEPROM of a device with slots lists the PDOs of its head; those of its modules are no differences.
 // covers: network-file, ES-69
 #[test]

@@ -11,6 +11,7 @@ use ringcat_engine::plan;
 
 use super::assignment;
 use super::difference::{Difference, DifferenceKind, Stated};
+use super::modules;
 use super::process_data;
 use super::properties::{self, buffers, words};
 
@@ -28,6 +29,8 @@ pub(super) struct Both<'a> {
     pub(super) info: &'a SubDeviceInfo,
     /// Version of its firmware, if it was read.
     pub(super) firmware: Option<&'a str>,
+    /// The modules that it has detected, if they were read.
+    pub(super) modules: Option<&'a [u32]>,
     /// The activation fails because of its place or its identity.
     pub(super) fails: bool,
 }
@@ -50,6 +53,10 @@ impl Both<'_> {
         }
         for (kind, prevents_op, text) in properties::differences(declared, stated, info) {
             add(kind, prevents_op, text);
+        }
+        let (prevents_op, texts) = modules::differences(declared, self.modules);
+        for text in texts {
+            add(DifferenceKind::Modules, prevents_op, text);
         }
         self.process_data(differences);
         let mut add = |kind, prevents_op, text: String| differences.push(self.difference(kind, prevents_op, text));

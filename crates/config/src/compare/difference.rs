@@ -2,10 +2,10 @@
 
 use std::fmt;
 
-use ringcat_engine::Topology;
 use ringcat_engine::config::IdentityField;
 use ringcat_engine::declared::SubDeviceId;
 use ringcat_engine::info::SubDeviceInfo;
+use ringcat_engine::{JunctionError, Topology};
 use ringcat_wire::address::Position;
 use ringcat_wire::sii::{CoeDetails, MailboxProtocols};
 
@@ -59,6 +59,12 @@ pub enum DifferenceKind {
     Firmware,
     /// Another cabling.
     Cable,
+    /// Other modules in the slots of a SubDevice.
+    Modules,
+    /// Distributed clocks that the network cannot have as declared.
+    Clocks,
+    /// A ring that the network does not have.
+    Ring,
 }
 
 impl DifferenceKind {
@@ -80,6 +86,9 @@ impl DifferenceKind {
             DifferenceKind::ProcessData => "process data",
             DifferenceKind::Firmware => "firmware",
             DifferenceKind::Cable => "cable",
+            DifferenceKind::Modules => "modules",
+            DifferenceKind::Clocks => "clocks",
+            DifferenceKind::Ring => "ring",
         }
     }
 
@@ -142,6 +151,7 @@ pub struct StatedSyncManager {
 
 /// A network that was found.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct FoundNetwork<'a> {
     /// The SubDevices of the scan.
     pub subdevices: &'a [SubDeviceInfo],
@@ -149,4 +159,47 @@ pub struct FoundNetwork<'a> {
     pub topology: &'a Topology,
     /// Versions of their firmware, in the same order; `None` or too short where they were not read.
     pub firmware: &'a [Option<String>],
+    /// Idents of the modules in their slots (object 0xF050), in the same order; `None` or too short where they were not
+    /// read.
+    pub modules: &'a [Option<Vec<u32>>],
+    /// Whether there is a redundant link.
+    pub has_redundant: bool,
+    /// A ring behind a junction that does not close as declared: the result of a test on the bus.
+    pub not_closed: Option<JunctionError>,
+}
+
+impl<'a> FoundNetwork<'a> {
+    /// A network on one link, of which nothing was read besides.
+    pub const fn new(subdevices: &'a [SubDeviceInfo], topology: &'a Topology) -> FoundNetwork<'a> {
+        let (firmware, modules) = (&[], &[]);
+        FoundNetwork { subdevices, topology, firmware, modules, has_redundant: false, not_closed: None }
+    }
+
+    /// Sets [`FoundNetwork::firmware`].
+    #[must_use]
+    pub const fn with_firmware(mut self, firmware: &'a [Option<String>]) -> FoundNetwork<'a> {
+        self.firmware = firmware;
+        self
+    }
+
+    /// Sets [`FoundNetwork::modules`].
+    #[must_use]
+    pub const fn with_modules(mut self, modules: &'a [Option<Vec<u32>>]) -> FoundNetwork<'a> {
+        self.modules = modules;
+        self
+    }
+
+    /// Sets [`FoundNetwork::has_redundant`].
+    #[must_use]
+    pub const fn with_redundant(mut self, has_redundant: bool) -> FoundNetwork<'a> {
+        self.has_redundant = has_redundant;
+        self
+    }
+
+    /// Sets [`FoundNetwork::not_closed`].
+    #[must_use]
+    pub const fn with_not_closed(mut self, not_closed: Option<JunctionError>) -> FoundNetwork<'a> {
+        self.not_closed = not_closed;
+        self
+    }
 }

@@ -57,6 +57,11 @@ impl Marks {
         }
     }
 
+    /// Whether the activation goes on without the SubDevice of this declaration, also where it is at another place.
+    pub(super) fn is_absent(&self, config: usize) -> bool {
+        matches!(self.resolutions.get(config), Some(Resolution::Absent { .. })) && !self.fails(config)
+    }
+
     /// Whether a SubDevice that is missing prevents OP: unless it is optional, and no declaration behind it is shifted.
     /// Never where the engine finds all: then it takes another one as the absent one.
     pub(super) fn misses(&self, config: usize, declared: &SubDeviceConfig) -> bool {

@@ -2,9 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use ringcat_engine::declared::SubDeviceId;
 use ringcat_engine::info::SubDeviceInfo;
 
 use super::align::{Place, position};
+use super::difference::{Difference, DifferenceKind};
+use super::marks::Marks;
 use super::moves::{Move, moves};
 use crate::configuration::Configuration;
 
@@ -45,6 +48,26 @@ impl Order {
         let mut by_bus: Vec<usize> = (0..declared.len()).collect();
         by_bus.sort_by_key(|at| bus[*at]);
         Order { moves: moves(&bus), declared, index, by_bus }
+    }
+
+    /// A SubDevice of the file that is at another place, as a difference.
+    pub(super) fn difference(
+        &self,
+        config: usize,
+        names: &[String],
+        marks: &Marks,
+        info: &SubDeviceInfo,
+    ) -> Option<Difference> {
+        let fails = marks.fails(config)
+            || self.other(config).is_some_and(|other| marks.fails(other))
+            || self.shifted_with(config).any(|other| marks.fails(other));
+        Some(Difference {
+            subdevice: Some(SubDeviceId(config)),
+            position: Some(info.position),
+            kind: DifferenceKind::Order,
+            prevents_op: fails,
+            text: self.text(config, names)?,
+        })
     }
 
     /// Where a SubDevice is, and where the file has it; `None` if it was named with the one that it has changed places

@@ -3,9 +3,9 @@
 
 use std::collections::BTreeMap;
 
-use ringcat_engine::config::SubDeviceConfig;
+use ringcat_engine::config::{SubDeviceConfig, SyncManagerRole};
 use ringcat_engine::info::SubDeviceInfo;
-use ringcat_wire::register::{PortKind, SyncManagerControl, SyncManagerMode};
+use ringcat_wire::register::{PortKind, SyncManagerControl, SyncManagerDirection, SyncManagerMode};
 use ringcat_wire::sii::{CoeDetails, MailboxLayout, MailboxProtocols, PhysicalPort};
 
 use super::difference::{DifferenceKind, Stated, StatedSyncManager};
@@ -25,7 +25,7 @@ const FEATURES: [(u8, &str); 3] = [
     (CoeDetails::PDO_ASSIGN, "a PDO assignment that can be written"),
     (CoeDetails::PDO_CONFIGURATION, "PDO mappings that can be written"),
 ];
-/// Mode and direction in the control byte of a SyncManager; an ENI decides the other bits (interrupts, watchdog).
+/// Mode and direction in the control byte of a SyncManager.
 const MODE: u8 = 0x0F;
 
 /// A difference: kind, whether it prevents OP, text.
@@ -67,7 +67,6 @@ fn sync_managers(declared: &SubDeviceConfig, stated: Option<&Stated>, info: &Sub
         return differences;
     }
     let is_checked = declared.declared.is_some() && !info.device_emulation;
-    let bits = if declared.declared.is_some() { MODE } else { 0xFF };
     for (number, of) in expected(declared, stated) {
         let mut add = |prevents_op: bool, text: String| {
             differences.push((DifferenceKind::SyncManager, prevents_op, format!("SM {number}: {text}")));
@@ -83,9 +82,30 @@ fn sync_managers(declared: &SubDeviceConfig, stated: Option<&Stated>, info: &Sub
         if let Some(start) = of.start.filter(|start| *start != own.start) {
             add(is_checked, format!("expected address {start:#06x}, got {:#06x}", own.start));
         }
-        if let Some(control) = of.control.filter(|control| (control ^ own.control) & bits != 0) {
+        if let Some(control) = of.control.filter(|control| *control != own.control) {
             let prevents_op = is_checked && !is_compatible(control, own.control);
             add(prevents_op, format!("expected control byte {control:#04x}, got {:#04x}", own.control));
+        }
+    }
+    differences.extend(mailbox_controls(declared, info));
+    differences
+}
+
+/// Mode and direction of the mailboxes of an ENI; another one prevents PREOP.
+fn mailbox_controls(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> Vec<Property> {
+    let mut differences = Vec::new();
+    for it in declared.declared.iter().flatten() {
+        let direction = match it.role {
+            SyncManagerRole::MailboxOut => SyncManagerDirection::Write,
+            SyncManagerRole::MailboxIn => SyncManagerDirection::Read,
+            _ => continue,
+        };
+        let (number, control) = (it.index, it.register.control);
+        let Some(own) = info.sync_managers.get(usize::from(number)) else { continue };
+        if (control.bits() ^ own.control) & MODE != 0 {
+            let prevents_op = control.mode != SyncManagerMode::Mailbox || control.direction != direction;
+            let text = format!("SM {number}: expected control byte {:#04x}, got {:#04x}", control.bits(), own.control);
+            differences.push((DifferenceKind::SyncManager, prevents_op, text));
         }
     }
     differences

@@ -6,6 +6,7 @@ use ringcat_engine::info::SubDeviceInfo;
 
 use super::alike::{DeviceKey, device, keys_of};
 use super::difference::Stated;
+use super::modules;
 use super::process_data;
 use crate::configuration::Configuration;
 
@@ -13,17 +14,24 @@ use crate::configuration::Configuration;
 #[derive(Clone, Debug)]
 pub struct DeclaredPdos {
     pdos: BTreeMap<DeviceKey, BTreeSet<u16>>,
+    /// Of these the file names the modules in their slots.
+    modular: BTreeSet<DeviceKey>,
 }
 
 impl Configuration {
     /// The PDOs that the file assigns to each type of SubDevice. `stated` is that of [`Configuration::differences`].
     pub fn declared_pdos(&self, stated: &[Stated]) -> DeclaredPdos {
         let mut pdos: BTreeMap<DeviceKey, BTreeSet<u16>> = BTreeMap::new();
+        let mut modular = BTreeSet::new();
         for (config, declared) in self.declaration.subdevices.iter().enumerate() {
             let own = process_data::pdos(declared).map(|(_, pdo)| pdo.index);
-            pdos.entry(device(declared, stated.get(config))).or_default().extend(own);
+            let key = device(declared, stated.get(config));
+            pdos.entry(key).or_default().extend(own);
+            if modules::are_declared(declared) {
+                modular.insert(key);
+            }
         }
-        DeclaredPdos { pdos }
+        DeclaredPdos { pdos, modular }
     }
 }
 
@@ -35,5 +43,11 @@ impl DeclaredPdos {
         let mut declared = keys_of(found).into_iter().filter_map(|key| self.pdos.get(&key));
         // At most one more is looked at than are listed.
         declared.any(|pdos| pdos.iter().any(|index| !listed.contains(index)))
+    }
+
+    /// Whether the file names the modules of a SubDevice of this vendor and product: start-up commands write their list
+    /// (0xF030), which is compared with [`FoundNetwork::modules`](super::FoundNetwork::modules).
+    pub fn have_modules(&self, found: &SubDeviceInfo) -> bool {
+        keys_of(found).iter().any(|key| self.modular.contains(key))
     }
 }

@@ -24,7 +24,7 @@ use super::unique::Names;
 use super::values::{Shift, Time};
 use super::write::next_position;
 use crate::compare::Stated;
-use crate::configuration::{Configuration, ImageArea, ProcessImage, SubDeviceFacts, Variable};
+use crate::configuration::{Configuration, DeclaredRings, ImageArea, ProcessImage, SubDeviceFacts, Variable};
 use crate::eni::Port;
 use crate::follow::{HIGH_WORD, LOW_WORD};
 
@@ -71,6 +71,11 @@ impl NetworkFile {
             image: self.image(),
             cycle: self.domain.iter().map(|domain| domain.period.0).min(),
             notices: Vec::new(),
+            rings: DeclaredRings {
+                is_ring: self.redundancy.ring,
+                junctions: self.junction_mode(),
+                connections: self.junction_connections(),
+            },
         }
     }
 

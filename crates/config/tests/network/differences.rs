@@ -31,7 +31,7 @@ fn file_of(found: &[SubDeviceInfo]) -> NetworkFile {
 /// Kinds and indices in the file, with positions on the bus.
 fn differences(file: &NetworkFile, found: &[SubDeviceInfo]) -> Vec<(DifferenceKind, Option<usize>, Option<u16>)> {
     let topology = Topology::default();
-    let network = FoundNetwork { subdevices: found, topology: &topology, firmware: &[] };
+    let network = FoundNetwork::new(found, &topology);
     let all = file.configuration().differences(network, &file.stated());
     assert!(all.iter().all(|it| !it.text.is_empty()));
     all.into_iter().map(|it| (it.kind, it.subdevice.map(|at| at.0), it.position.map(|at| at.0))).collect()

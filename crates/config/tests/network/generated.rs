@@ -45,7 +45,7 @@ fn file_of(found: &[SubDeviceInfo]) -> NetworkFile {
 
 fn differences(file: &NetworkFile, found: &[SubDeviceInfo]) -> Vec<Difference> {
     let topology = Topology::default();
-    let network = FoundNetwork { subdevices: found, topology: &topology, firmware: &[] };
+    let network = FoundNetwork::new(found, &topology);
     file.configuration().differences(network, &file.stated())
 }
 

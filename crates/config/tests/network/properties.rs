@@ -45,7 +45,8 @@ fn differences(change: impl FnOnce(&mut SubDeviceInfo)) -> Vec<(DifferenceKind, 
     let mut found = drive();
     change(&mut found);
     let topology = Topology::default();
-    let network = FoundNetwork { subdevices: &[found], topology: &topology, firmware: &[] };
+    let found = [found];
+    let network = FoundNetwork::new(&found, &topology);
     let all = file.configuration().differences(network, &file.stated());
     assert!(all.iter().all(|it| !it.prevents_op), "a run takes them from the EEPROM: {all:#?}");
     let text = |text: &str| text.trim_start_matches("position 0 \"Drive\": ").to_owned();

@@ -5,18 +5,19 @@ use alloc::rc::Rc;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
+use ringcat_wire::address::Position;
+
 use super::MainDevice;
 use super::activate_error::ActivateError;
 use super::active::Active;
 use super::areas::{Areas, Directory};
 use super::declaration::Declaration;
+use super::lay_out::lay_out;
 use super::live_status::LiveStatus;
 use super::loaded::Loaded;
-use super::lrw::{self, check_lrw};
-use super::prepare::{
-    check_clocks, check_domains, domain_specs, match_declaration, members, plan_all, report_oddities, with_domain,
-    witnesses,
-};
+use super::lrw;
+use super::obstacles::replaced;
+use super::prepare::{check_clocks, check_domains, match_declaration, members, plan_all, report_oddities, with_domain};
 use super::repeats;
 use crate::board::Board;
 use crate::config::ClockConfig;
@@ -30,6 +31,7 @@ use crate::procedures::shared_segment::{Beside, SharedSegment};
 use crate::queue::{Producer, queue};
 use crate::ring_status::{CableErrors, cables};
 use crate::segment::clocks::Clocks;
+use crate::segment::findings::{DeclarationFinding, Oddity};
 use crate::segment::{Cabling, Declared, Found, Observation, SubDevices, stations_by_position};
 use crate::time::Instant;
 use crate::topology::Topology;
@@ -50,6 +52,7 @@ impl MainDevice {
         let (found, unassigned) = match_declaration(&self.segment, &declaration, &scan)?;
         let topology = loaded.topology((&bus, &self.segment), self.options.junctions, &scan, &found)?;
         check_clocks(&declaration, &found)?;
+        let replaced = replaced(&declaration, &found, scan.subdevices.iter().map(|info| &**info));
         let clock_config = declaration.clocks.clone();
         let plans = plan_all(&declaration, &found)?;
         check_domains(&loaded.declaration, &plans)?;
@@ -61,6 +64,7 @@ impl MainDevice {
         let clocks = clocks_of(clock_config.clone(), &scan, &topology, &subdevices);
         let directory = Directory::new(&plans, &layout).with_sent_once(&repeats);
         report_oddities(&self.segment, &subdevices, &layout);
+        self.report_reference(replaced);
         let count = subdevices.member_count();
         let board = Arc::new(board_of(&subdevices, &layout));
         let (producer, consumer) = queue(CYCLIC_EVENTS);
@@ -106,23 +110,23 @@ impl MainDevice {
         found: &[Option<Rc<SubDeviceInfo>>],
         session: u32,
     ) -> Result<(Vec<DomainSpec>, Layout), ActivateError> {
-        let links = self.options.links();
-        let lrw = lrw::policy(declaration.lrw, &declaration.explicit_lrw, links)?;
-        let specs = domain_specs(declaration, plans, lrw, links)?;
-        check_lrw(lrw, &specs, links)?;
+        let (links, supervision) = (self.options.links(), self.options.supervision);
+        let max_datagrams = self.options.most_datagrams();
         #[cfg(feature = "standby")]
-        if self.is_lrw_refused(lrw) {
+        if self.is_lrw_refused(lrw::policy(declaration.lrw, &declaration.explicit_lrw, links)?) {
             return Err(ActivateError::LrwWithStandby);
         }
-        let witnesses = witnesses(plans, found, &specs);
-        let (supervision, max_datagrams) = (self.options.supervision, self.options.most_datagrams());
-        let rules = Rules { links, supervision, lrw, witnesses: &witnesses, session, max_datagrams };
-        let mut layout = Layout::with(&specs, rules).map_err(ActivateError::Layout)?;
-        if declaration.clocks.is_some() {
-            layout.add_clocks().map_err(ActivateError::Layout)?;
-        }
+        let rules = Rules { links, supervision, lrw: declaration.lrw, witnesses: &[], session, max_datagrams };
+        let (specs, layout) = lay_out(declaration, plans, found, rules)?;
         self.memories.check(&layout)?;
         Ok((specs, layout))
+    }
+
+    /// Reports that a declared reference clock is none.
+    fn report_reference(&self, replaced: Option<(SubDeviceId, Option<Position>)>) {
+        let Some((subdevice, instead)) = replaced else { return };
+        let oddity = Oddity::Reference { instead };
+        self.segment.observe(Observation::Compared(DeclarationFinding::Oddity(subdevice, oddity)));
     }
 
     /// The cyclic half, with images in memory of the application where it is declared.

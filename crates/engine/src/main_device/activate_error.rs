@@ -219,6 +219,24 @@ impl fmt::Display for ActivateError {
 }
 
 impl ActivateError {
+    /// The SubDevice whose declaration is refused, if it is a single one.
+    pub const fn subdevice(&self) -> Option<SubDeviceId> {
+        match self {
+            ActivateError::Config { subdevice, .. }
+            | ActivateError::Setup { subdevice, .. }
+            | ActivateError::Target { subdevice, .. }
+            | ActivateError::Headless { subdevice }
+            | ActivateError::TwoDomains { subdevice, .. }
+            | ActivateError::Registered { subdevice, .. }
+            | ActivateError::NoDomain { subdevice }
+            | ActivateError::SyncCycle { subdevice, .. }
+            | ActivateError::LrwUnknown { subdevice, .. }
+            | ActivateError::NoClock { subdevice, .. }
+            | ActivateError::UnknownMember { subdevice, .. } => Some(*subdevice),
+            _ => None,
+        }
+    }
+
     fn fmt_memory(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             ActivateError::MemoryTooShort { domain, needed, got } => {

@@ -34,11 +34,9 @@ impl Loaded {
         scan: &Found,
         found: &[Option<Rc<SubDeviceInfo>>],
     ) -> Result<Topology, ActivateError> {
+        check_connections(mode, &self.connections)?;
         if self.connections.is_empty() {
-            return match mode {
-                JunctionMode::Strict => Err(ActivateError::Junction(JunctionError::NoConnection)),
-                JunctionMode::Disabled | JunctionMode::Automatic => Ok(scan.topology.clone()),
-            };
+            return Ok(scan.topology.clone());
         }
         let mut closings = Vec::new();
         for connection in &self.connections {
@@ -77,6 +75,14 @@ impl Loaded {
         let end = |subdevice: SubDeviceId, port: u8| Some((subdevices.member(subdevice.0)?.station, port));
         let ends = |it: &JunctionConnection| Some([end(it.head, it.head_port)?, end(it.tail, it.tail_port)?]);
         self.connections.iter().filter_map(ends).collect()
+    }
+}
+
+/// The mode strict needs a connection.
+pub(super) fn check_connections(mode: JunctionMode, connections: &[JunctionConnection]) -> Result<(), ActivateError> {
+    match mode {
+        JunctionMode::Strict if connections.is_empty() => Err(ActivateError::Junction(JunctionError::NoConnection)),
+        JunctionMode::Disabled | JunctionMode::Automatic | JunctionMode::Strict => Ok(()),
     }
 }
 

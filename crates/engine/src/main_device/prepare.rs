@@ -79,13 +79,23 @@ pub(super) fn check_clocks(
     declaration: &Declaration,
     found: &[Option<Rc<SubDeviceInfo>>],
 ) -> Result<(), ActivateError> {
-    for (subdevice, (config, info)) in declaration.subdevices.iter().zip(found).enumerate() {
-        let has_clock = fails_alone(declaration) || info.as_ref().is_none_or(|info| info.controller.features.dc);
-        if config.sync.is_some() && (!has_clock || declaration.clocks.is_none()) {
-            return Err(ActivateError::NoClock { subdevice: SubDeviceId(subdevice), has_clock });
-        }
-    }
-    Ok(())
+    let is_alone = fails_alone(declaration);
+    let counts =
+        |error: &ActivateError| !(is_alone && matches!(error, ActivateError::NoClock { has_clock: false, .. }));
+    let mut errors = (0..found.len()).filter_map(|subdevice| no_clock(declaration, found, subdevice));
+    errors.find(counts).map_or(Ok(()), Err)
+}
+
+/// Why a SubDevice cannot have the SYNC signals that are declared for it.
+pub(super) fn no_clock(
+    declaration: &Declaration,
+    found: &[Option<Rc<SubDeviceInfo>>],
+    subdevice: usize,
+) -> Option<ActivateError> {
+    declaration.subdevices.get(subdevice)?.sync?;
+    let has_clock = found.get(subdevice)?.as_ref().is_none_or(|info| info.controller.features.dc);
+    let error = ActivateError::NoClock { subdevice: SubDeviceId(subdevice), has_clock };
+    (!has_clock || declaration.clocks.is_none()).then_some(error)
 }
 
 fn report_absence(segment: &SharedSegment, subdevice: usize, is_optional: bool, error: ConfigError) {

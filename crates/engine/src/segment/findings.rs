@@ -86,4 +86,9 @@ pub enum Oddity {
     },
     /// It is not there, and its PDOs are not declared.
     NoPlace,
+    /// It is the declared reference clock and has no clock.
+    Reference {
+        /// The position of the clock that takes its place.
+        instead: Option<Position>,
+    },
 }

@@ -134,8 +134,11 @@ impl EniFile {
     pub fn stated(&self) -> Vec<Stated> {
         let stated = |subdevice: &ringcat_config::eni::SubDevice| {
             let mut stated = Stated::default();
-            stated.device = subdevice.vendor_id.zip(subdevice.product_code);
-            stated.revision = subdevice.revision;
+            // The elements are required: 0 states nothing.
+            let [vendor, product, revision] = [subdevice.vendor_id, subdevice.product_code, subdevice.revision]
+                .map(|number| number.filter(|number| *number != 0));
+            stated.device = vendor.zip(product);
+            stated.revision = revision;
             stated.ports = ports(&subdevice.physics);
             if let Some(mailbox) = &subdevice.mailbox {
                 // A list may be absent: then nothing is stated.

@@ -45,7 +45,7 @@ fn file_of(types: &[&str], change: impl FnOnce(&mut NetworkFile)) -> LoadedNetwo
 }
 
 fn found(scan: &Scan) -> FoundNetwork<'_> {
-    FoundNetwork { subdevices: &scan.subdevices, topology: &scan.topology, firmware: &[] }
+    FoundNetwork::new(&scan.subdevices, &scan.topology)
 }
 
 /// Whether the declared network reaches OP.

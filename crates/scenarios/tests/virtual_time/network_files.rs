@@ -68,7 +68,7 @@ fn differences_between_the_file_and_another_bus_are_named() {
     let network = LoadedNetwork::from_bytes("machine.toml", text_of(&scan).as_bytes()).expect("the file is valid");
     let on = |text: &str| {
         let (_, scan) = scanned(text);
-        let found = FoundNetwork { subdevices: &scan.subdevices, topology: &scan.topology, firmware: &[] };
+        let found = FoundNetwork::new(&scan.subdevices, &scan.topology).with_redundant(true);
         let differences = network.configuration.differences(found, &network.stated());
         differences.into_iter().map(|it| (it.kind, it.subdevice.map(|at| at.0))).collect::<Vec<_>>()
     };
@@ -90,7 +90,7 @@ fn other_contents_of_a_subdevice_are_named_by_their_kind() {
         let network = LoadedNetwork::new(network.file);
         let mut firmware = vec![None; scan.subdevices.len()];
         firmware[drive] = Some("1.0".to_owned());
-        let found = FoundNetwork { subdevices: &scan.subdevices, topology: &scan.topology, firmware: &firmware };
+        let found = FoundNetwork::new(&scan.subdevices, &scan.topology).with_redundant(true).with_firmware(&firmware);
         let differences = network.configuration.differences(found, &network.stated());
         assert!(differences.iter().all(|it| it.text.contains("position 5 \"servo\"")), "{differences:?}");
         differences.into_iter().map(|it| (it.kind, it.prevents_op)).collect::<Vec<_>>()

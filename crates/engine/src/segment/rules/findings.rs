@@ -95,5 +95,12 @@ fn text(oddity: &Oddity) -> String {
         Oddity::NoPlace => "not there, and its PDOs are not declared: when it comes, it has no place in the process \
                             image"
             .to_owned(),
+        Oddity::Reference { instead: Some(instead) } => alloc::format!(
+            "declared as the reference clock, but it has no distributed clock: the clock at position {instead} is the \
+             reference"
+        ),
+        Oddity::Reference { instead: None } => {
+            "declared as the reference clock, but neither it nor another SubDevice has a distributed clock".to_owned()
+        }
     }
 }

@@ -1,0 +1,32 @@
+//! The domains of a declaration, and the places of their process data.
+
+use alloc::rc::Rc;
+use alloc::vec::Vec;
+
+use super::activate_error::ActivateError;
+use super::areas::Areas;
+use super::declaration::Declaration;
+use super::lrw::{self, check_lrw};
+use super::prepare::{domain_specs, witnesses};
+use crate::info::SubDeviceInfo;
+use crate::layout::{DomainSpec, Layout, Rules};
+
+/// The domains, and the places of their process data. Policy of LRW and witnesses in `rules` are those of the
+/// declaration.
+pub(super) fn lay_out(
+    declaration: &Declaration,
+    plans: &[Areas],
+    found: &[Option<Rc<SubDeviceInfo>>],
+    rules: Rules<'_>,
+) -> Result<(Vec<DomainSpec>, Layout), ActivateError> {
+    let lrw = lrw::policy(declaration.lrw, &declaration.explicit_lrw, rules.links)?;
+    let specs = domain_specs(declaration, plans, lrw, rules.links)?;
+    check_lrw(lrw, &specs, rules.links)?;
+    let witnesses = witnesses(plans, found, &specs);
+    let rules = Rules { lrw, witnesses: &witnesses, ..rules };
+    let mut layout = Layout::with(&specs, rules).map_err(ActivateError::Layout)?;
+    if declaration.clocks.is_some() {
+        layout.add_clocks().map_err(ActivateError::Layout)?;
+    }
+    Ok((specs, layout))
+}
