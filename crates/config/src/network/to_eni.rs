@@ -80,7 +80,8 @@ fn is_scanned(of: &SubDevice) -> bool {
     !of.ports.is_empty() || of.mailbox.is_some()
 }
 
-/// Mailboxes that a file leaves to the EEPROM. A SubDevice whose ports the file has was scanned or described: it has none.
+/// Mailboxes that a file leaves to the EEPROM. A SubDevice whose ports the file has was scanned or described: it has
+/// none.
 fn mailboxes(file: &NetworkFile) -> Vec<LeftOut> {
     let subdevices = (0..).zip(&file.subdevice).filter(|(_, of)| of.mailbox.is_none());
     let (with_commands, others): (Vec<_>, Vec<_>) = subdevices.partition(|(_, of)| of.startup.iter().any(is_mail));

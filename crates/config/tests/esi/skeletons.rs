@@ -112,7 +112,7 @@ fn what_images_of_vendors_lose_in_a_description_is_a_notice_and_listed() {
         let (made, options, compared) = again(&image);
         found.push_str(&format!("{} {}: {:?}\n", name(path), options.profile, compared.likeness));
         for it in compared.differences.iter().filter(|it| !it.is_individual) {
-            let short = |text: &str| text.chars().take(60).collect::<String>();
+            let short = |text: &str| text.chars().take(40).collect::<String>();
             found.push_str(&format!("    {}: {} / {}\n", it.field, short(&it.expected), short(&it.got)));
         }
         made.notices.iter().for_each(|notice| found.push_str(&format!("    notice: {notice}\n")));
@@ -136,7 +136,7 @@ fn what_images_of_vendors_lose_in_a_description_is_a_notice_and_listed() {
     let other = found.lines().zip(listed.lines()).find(|(found, listed)| found != listed);
     assert!(
         found == listed,
-        "{other:?}: read the difference; RINGCAT_WRITE_SII_DIFFERENCES=1 cargo test -p ringcat-config skeletons lists it"
+        "{other:?}: read the difference; RINGCAT_WRITE_SII_DIFFERENCES=1 cargo test -p ringcat-config lists it"
     );
 }
 

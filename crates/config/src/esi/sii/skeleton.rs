@@ -11,9 +11,8 @@ use ringcat_wire::sii::{
 };
 
 use super::data_type::name_of;
+use lost::GENERATED;
 
-/// Categories that the elements of a description give.
-const GENERATED: [u16; 8] = [10, 30, 40, 41, 43, 50, 51, 60];
 /// A sync unit that tolerates repeated frames.
 const FRAME_REPEAT: u8 = 0xF0;
 /// Protocols that have an element.

@@ -5,13 +5,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use ringcat_wire::sii::{Pdo, PdoDirection, Sii};
 
-use super::GENERATED;
 use crate::esi::sii::build::build;
 use crate::esi::sii::compare::{FieldDifference, compare};
 use crate::esi::sii::fields::ORDER_OF_STRINGS;
 use crate::esi::sii::profile::{SiiOptions, SiiProfile};
 use crate::esi::{Esi, EsiError, read};
 
+/// Categories that the elements of a description give.
+pub(super) const GENERATED: [u16; 8] = [10, 30, 40, 41, 43, 50, 51, 60];
 /// Fields that a tool decides, or that have a notice of their own.
 const ASIDE: [&str; 7] = [
     ORDER_OF_STRINGS,
