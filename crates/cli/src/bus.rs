@@ -14,7 +14,7 @@ use crate::descriptions::{Detected, detected};
 use crate::failure::Failure;
 use crate::interfaces::{InterfaceArguments, LinkNames, SourceAddress};
 use crate::oddities::SiiOddities;
-use crate::output::warn;
+use crate::output::{complain, warn};
 use crate::surroundings::Surroundings;
 use crate::thread::ThreadArguments;
 
@@ -105,7 +105,7 @@ impl BusArguments {
 fn print(event: &ringcat::TimedEvent) {
     match &event.event {
         Event::ScanProgress { .. } | Event::ScanFailed { .. } => {}
-        _ => eprintln!("{}", describe(event, &Names::default())),
+        _ => complain(describe(event, &Names::default())),
     }
 }
 

@@ -13,7 +13,7 @@ use crate::failure::Failure;
 use crate::interfaces::{LinkNames, describe_down};
 use crate::json::capture::{Capture, Interface};
 use crate::json::data::Data;
-use crate::output::{is_terminal, say, warn, write};
+use crate::output::{draw, is_terminal, say, warn};
 use crate::recording::{DESCRIPTIONS, lines};
 use crate::times::time;
 use crate::verdict::{Report, Verdict};
@@ -80,7 +80,7 @@ pub fn run(arguments: &CaptureArguments) -> Result<Report, Failure> {
         let now = monotonic::now_ns();
         if terminal && now >= shown {
             shown = now + LOOK.as_nanos() as u64;
-            write(format_args!("\r{frames:>9} frames "));
+            draw(format_args!("\r{frames:>9} frames "));
         }
     }
     if terminal {

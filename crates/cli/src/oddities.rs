@@ -1,5 +1,6 @@
 //! Faults of SIIs that a scan reports. They are printed behind it, when the names of their PDOs are known.
 
+use crate::output::complain;
 use ringcat::config::ObjectNames;
 use ringcat::text::{Names, describe};
 use ringcat::{Event, Position, TimedEvent};
@@ -27,7 +28,7 @@ impl SiiOddities {
 
     /// Prints them on the standard error output.
     pub fn print(&self, names: &[ObjectNames]) {
-        self.texts(names).for_each(|text| eprintln!("{text}"));
+        self.texts(names).for_each(complain);
     }
 }
 

@@ -2,7 +2,11 @@
 //!
 //! A reader may close it: `ringcat demo | head` goes on to its end. A full disk is another matter: the output is
 //! incomplete, so the command has failed.
+//!
+//! Texts of files and devices, and names of files, may hold control characters, which a terminal obeys: whatever is
+//! printed for people passes [`visible`].
 
+use std::borrow::Cow;
 use std::fmt::Arguments;
 use std::io::{self, ErrorKind, IsTerminal, Write, stdout};
 use std::sync::OnceLock;
@@ -49,6 +53,13 @@ pub fn is_file() -> bool {
 
 /// Writes text and flushes it, unless the standard output is for JSON or for a file. A closed pipe is no error.
 pub fn write(text: Arguments<'_>) {
+    if !is_json() && !is_file() {
+        put(format_args!("{}", visible(&text.to_string())));
+    }
+}
+
+/// As [`write()`] with the control characters of the command itself: to the beginning of a line, of a table.
+pub fn draw(text: Arguments<'_>) {
     if !is_json() && !is_file() {
         put(text);
     }
@@ -113,9 +124,32 @@ pub fn counted(count: usize, one: &str, more: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { more })
 }
 
+/// A line on the standard error output.
+pub fn complain(text: impl std::fmt::Display) {
+    eprintln!("{}", visible(&text.to_string()));
+}
+
 /// A warning on the standard error output, with the name of the program before it.
 pub fn warn(text: impl std::fmt::Display) {
-    eprintln!("ringcat: {text}");
+    complain(format_args!("ringcat: {text}"));
+}
+
+/// A text without characters that change the state of a terminal or the direction of what it shows: they are written
+/// as in a string of a program. Lines and columns stay.
+fn visible(text: &str) -> Cow<'_, str> {
+    let is_hidden = |c: char| match c {
+        '\n' | '\t' => false,
+        '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => true,
+        _ => c.is_control(),
+    };
+    if !text.contains(is_hidden) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len() + 16);
+    for c in text.chars() {
+        if is_hidden(c) { shown.extend(c.escape_debug()) } else { shown.push(c) }
+    }
+    Cow::Owned(shown)
 }
 
 /// Like `println!`, without a panic on a closed pipe; nothing where the standard output is for JSON.
@@ -125,3 +159,18 @@ macro_rules! say {
 }
 
 pub(crate) use say;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // covers: verdict
+    #[test]
+    fn control_characters_of_files_and_devices_are_shown_and_not_obeyed() {
+        for text in ["", "plain", "two\nlines\tand a column", "Gerät 中 \u{1F600}"] {
+            assert!(matches!(visible(text), Cow::Borrowed(shown) if shown == text));
+        }
+        let wild = "a\u{1b}[2Jb\u{9b}31m\r\u{7}\0\u{7f}\u{202e}\u{2066}c\n";
+        assert_eq!(visible(wild), "a\\u{1b}[2Jb\\u{9b}31m\\r\\u{7}\\0\\u{7f}\\u{202e}\\u{2066}c\n");
+    }
+}

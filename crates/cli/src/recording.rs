@@ -13,7 +13,7 @@ use ringcat_link::{Recorder, RecorderError};
 
 use crate::failure::Failure;
 use crate::interfaces::{InterfaceArguments, LinkNames};
-use crate::output::warn;
+use crate::output::{complain, warn};
 
 /// The option.
 #[derive(Args, Clone, Debug)]
@@ -77,7 +77,7 @@ impl Recording {
         match recorder.finish() {
             Ok(recorded) => {
                 for line in lines(self.links.all(), &recorded) {
-                    eprintln!("{}: {line}", path.display());
+                    complain(format_args!("{}: {line}", path.display()));
                 }
                 let lacking: u64 = recorded.iter().map(|frames| frames.lost + frames.lost_by_kernel).sum();
                 (lacking > 0).then(|| format!("the capture lacks {lacking} frames"))

@@ -15,7 +15,7 @@ use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::scan;
 use crate::oddities::SiiOddities;
-use crate::output::{counted, say, warn};
+use crate::output::{complain, counted, say, warn};
 use crate::surroundings::Surroundings;
 use crate::table;
 use crate::verdict::{Report, Verdict};
@@ -62,7 +62,7 @@ pub fn run(arguments: &ScanArguments) -> Result<Report, Failure> {
         Event::ScanProgress { .. } | Event::ScanFailed { .. } => {}
         _ if oddities.keep(event) => {}
         _ => match surroundings.note(&event.event) {
-            None => eprintln!("{}", describe(event, &Names::default())),
+            None => complain(describe(event, &Names::default())),
             Some(words) => words.into_iter().for_each(warn),
         },
     });
@@ -72,7 +72,10 @@ pub fn run(arguments: &ScanArguments) -> Result<Report, Failure> {
         surroundings.explain(error, foreign)
     })?;
     if foreign > 0 {
-        eprintln!("{foreign} frames of another MainDevice arrived during the scan: {}", surroundings.senders());
+        complain(format_args!(
+            "{foreign} frames of another MainDevice arrived during the scan: {}",
+            surroundings.senders()
+        ));
     }
     let wanted = Wanted { firmware: false, modules: true };
     let mut modules = |info: &SubDeviceInfo| match descriptions.as_mut().is_some_and(|it| it.has_modules(info)) {

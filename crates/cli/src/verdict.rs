@@ -12,7 +12,7 @@ use std::process::ExitCode;
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::line::{Ending, Kind, Outcome, ResultLine};
-use crate::output::{self, head, say, warn};
+use crate::output::{self, complain, head, say, warn};
 
 /// Whether everything held that a command was to show.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -86,11 +86,11 @@ fn conclude_report(verdict: &Verdict, data: &Data) -> ExitCode {
         say!("result: {}", verdict.words());
     }
     if let Some(error) = output::failure() {
-        eprintln!("result: FAILED: the standard output cannot be written: {error}");
+        complain(format_args!("result: FAILED: the standard output cannot be written: {error}"));
         return ExitCode::from(FAILED);
     }
     if output::is_json() || output::is_file() {
-        eprintln!("result: {}", verdict.words());
+        complain(format_args!("result: {}", verdict.words()));
     }
     ExitCode::from(exit_code)
 }
@@ -114,7 +114,7 @@ pub fn conclude_printed_error(message: &str, details: Vec<String>) -> ExitCode {
     if output::is_json() {
         output::write_json(&line_without_data(Outcome::Error, ERROR, message, details));
     }
-    eprintln!("result: FAILED: {message}");
+    complain(format_args!("result: FAILED: {message}"));
     ExitCode::from(ERROR)
 }
 
@@ -128,7 +128,7 @@ pub fn end_at_once(message: &str) -> ! {
         // The program ends with a failure in any case.
         let _ = File::from(out).write_all(format!("{text}\n").as_bytes());
     }
-    eprintln!("result: FAILED: {message}");
+    complain(format_args!("result: FAILED: {message}"));
     std::process::exit(i32::from(FAILED));
 }
 

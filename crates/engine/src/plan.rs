@@ -19,7 +19,7 @@ use ringcat_wire::address::{LogicalAddress, RegisterAddress};
 use ringcat_wire::register::{Fmmu, map};
 use ringcat_wire::sii::{MailboxLayout, SyncManagerKind};
 
-use crate::config::SubDeviceConfig;
+use crate::config::{DeclaredSyncManager, SubDeviceConfig};
 use crate::info::{Direction, MailboxSyncManagers, SubDeviceInfo};
 
 pub use error::{PlanError, PlanFault, PlanProblem, PlanWarning};
@@ -62,20 +62,23 @@ fn plan_inner(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDevic
     let mut warnings = Vec::new();
     let (mailbox, process_data, pdos) = match &config.declared {
         Some(declared) => {
-            let (mailbox, process_data) = declared::areas(declared, info)?;
+            let (mut mailbox, process_data) = declared::areas(declared, info)?;
+            if mailbox.is_empty() {
+                mailbox = mailbox_beside(info, declared, &process_data).unwrap_or_default();
+                warnings.extend((!mailbox.is_empty()).then_some(PlanWarning::MailboxOfSii));
+            }
             (mailbox, process_data, Vec::new())
         }
         None => {
-            let layout = info.mailbox.filter(|_| mailbox_wanted(info));
-            let mailbox = layout.map(|layout| mailbox_pair(info, &layout, info.mailbox_sync_managers()));
-            let mailbox = mailbox.unwrap_or_default();
+            let mailbox = mailbox_of_sii(info).unwrap_or_default();
             let process_data = areas::areas(config, info, &mailbox)?;
             let pdos = pdos::pdo_plans(config, info, &process_data, &mut warnings);
             (mailbox, process_data, pdos)
         }
     };
     check::check(info, &mailbox, &process_data)?;
-    let supported = check::SupportedProtocols::new(config, info, !mailbox.is_empty());
+    let is_declared = config.declared.is_some() && !warnings.contains(&PlanWarning::MailboxOfSii);
+    let supported = check::SupportedProtocols::new(is_declared, info, !mailbox.is_empty());
     let sizes = check::MailboxSizes::new(&mailbox, &bootstrap);
     let possible = |command| check::command(supported, command).and_then(|()| sizes.holds(command));
     config.startup.iter().try_for_each(possible)?;
@@ -117,6 +120,23 @@ fn mailbox_wanted(info: &SubDeviceInfo) -> bool {
     let MailboxSyncManagers { written, read } = info.mailbox_sync_managers();
     let managers = [written, read].into_iter().filter_map(|index| info.sync_managers.get(usize::from(index)));
     !managers.into_iter().any(|sm| matches!(sm.kind, SyncManagerKind::Outputs | SyncManagerKind::Inputs))
+}
+
+fn mailbox_of_sii(info: &SubDeviceInfo) -> Option<Vec<SmPlan>> {
+    let layout = info.mailbox.filter(|_| mailbox_wanted(info))?;
+    Some(mailbox_pair(info, &layout, info.mailbox_sync_managers()))
+}
+
+/// The mailboxes of the SII beside process data of a file that has none: the SubDevice refuses PREOP without them.
+/// `None` if the file uses their SyncManagers or their memory.
+fn mailbox_beside(
+    info: &SubDeviceInfo,
+    declared: &[DeclaredSyncManager],
+    process_data: &[AreaPlan],
+) -> Option<Vec<SmPlan>> {
+    let mailbox = mailbox_of_sii(info)?;
+    let is_used = mailbox.iter().any(|sm| declared.iter().any(|it| it.index == sm.index));
+    (!is_used && check::check(info, &mailbox, process_data).is_ok()).then_some(mailbox)
 }
 
 fn mailbox_pair(info: &SubDeviceInfo, layout: &MailboxLayout, of: MailboxSyncManagers) -> Vec<SmPlan> {

@@ -6,7 +6,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use ringcat::config::{Configuration, Difference, ExportOptions, FoundNetwork, Stated};
+use ringcat::config::network::model::SubDevice;
+use ringcat::config::{Configuration, Difference, ExportOptions, FoundNetwork, Stated, esi};
 use ringcat::eni::EniFile;
 use ringcat::esi::{EsiDevices, load};
 use ringcat::network::{LoadedNetwork, NetworkFile, ScanOptions};
@@ -81,30 +82,65 @@ fn check(scan: &Scan) -> Result<(), String> {
     differences(&eni.configuration, &eni.stated(), scan).map_err(|it| format!("compared with the ENI: {it}"))
 }
 
-// covers: network-file, eni-run, esi-use
-#[test]
-fn networks_of_all_described_devices_are_the_same_in_a_file_an_eni_and_the_bus() {
-    let Some(files) = real() else { return };
+/// What differs between a declaration from the description alone and the device of the same description.
+fn check_declared(scan: &Scan, esi: &esi::Esi, device: &esi::Device) -> Result<(), String> {
+    let choices = esi::Choices::default();
+    // A device that cannot be declared without choices has nothing to compare.
+    let Ok(selection) = esi::select(esi, device, &choices) else { return Ok(()) };
+    let Ok(from) = SubDevice::from_esi(&selection, PERIOD, choices.language) else { return Ok(()) };
+    let mut file = NetworkFile::empty("one", PERIOD);
+    file.push(from.subdevice);
+    differences(&file.configuration(), &file.stated(), scan)
+}
+
+/// Calls `check` for the newest revision of each device of the real descriptions. Returns the number of devices and
+/// what is wrong with them.
+fn of_each_device(
+    check: impl Fn(&Scan, &esi::Esi, &esi::Device) -> Result<(), String>,
+) -> Option<(usize, Vec<String>)> {
+    let files = real()?;
     let devices = EsiDevices::default();
     let (mut checked, mut failed) = (0, Vec::new());
     for file in files {
         let esi = load(&file).unwrap_or_else(|error| panic!("{error}"));
         let name = file.file_name().unwrap().to_string_lossy().into_owned();
-        // Of several revisions the newest one.
-        let mut of_types: BTreeMap<(&str, u32), u32> = BTreeMap::new();
+        let mut newest: BTreeMap<(&str, u32), &esi::Device> = BTreeMap::new();
         for of in esi.devices.iter().filter(|device| !device.is_invisible) {
-            let newest = of_types.entry((of.kind.trim(), of.product_code)).or_default();
-            *newest = of.revision.max(*newest);
+            let known = newest.entry((of.kind.trim(), of.product_code)).or_insert(of);
+            *known = if of.revision > known.revision { of } else { *known };
         }
-        for ((kind, product), revision) in of_types {
+        for ((kind, product), device) in newest {
+            let revision = device.revision;
             let keys = format!("esi = '{name}'\ntype = '''{kind}'''\nproduct = {product}\nrevision = {revision}\n");
             let text = format!("[[device]]\nname = \"it\"\n{keys}");
-            let result = scan_of(&text, file.parent().unwrap(), &devices).and_then(|scan| check(&scan));
+            let scan = scan_of(&text, file.parent().unwrap(), &devices);
+            let result = scan.and_then(|scan| check(&scan, &esi, device));
             checked += 1;
             failed.extend(result.err().map(|error| format!("{name} {kind}: {error}")));
         }
     }
     println!("{checked} devices");
+    Some((checked, failed))
+}
+
+// covers: network-file, esi-use, ES-47
+#[test]
+fn a_declaration_from_a_description_is_no_difference_to_its_device() {
+    let Some((checked, mut failed)) = of_each_device(check_declared) else { return };
+    // Their operation modes assign other PDOs than the SII lists.
+    let modes = ["EL1262:", "EL1262-0050:", "EL1264:", "EL2262:"];
+    // The file has a category of the SII that contradicts its elements.
+    let contradictory = ["its CoE has complete access", "expected ports \"YY\", got \"YYYY\""];
+    failed.retain(|text| !modes.iter().any(|kind| text.contains(kind)));
+    failed.retain(|text| !contradictory.iter().all(|words| text.contains(words)));
+    assert!(failed.is_empty(), "{} of {checked}: {failed:#?}", failed.len());
+    assert!(checked > 200, "{checked}");
+}
+
+// covers: network-file, eni-run, esi-use
+#[test]
+fn networks_of_all_described_devices_are_the_same_in_a_file_an_eni_and_the_bus() {
+    let Some((checked, failed)) = of_each_device(|scan, _, _| check(scan)) else { return };
     assert!(failed.is_empty(), "{} of {checked}: {failed:#?}", failed.len());
     assert!(checked > 200, "{checked}");
 }

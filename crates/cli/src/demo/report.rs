@@ -10,7 +10,7 @@ use super::incident::Incident;
 use super::plan::Plan;
 use super::watch::{Account, Watch};
 use crate::json::demo::Check;
-use crate::output::{is_terminal, say, write, write_event};
+use crate::output::{draw, is_terminal, say, write, write_event};
 use crate::run_log::name_of;
 use crate::table;
 use crate::verdict::Verdict;
@@ -99,7 +99,8 @@ impl Reporter {
     pub fn scan_event(&mut self, event: &TimedEvent) {
         let text = describe(event, &Names::default());
         if matches!(event.event, Event::ScanProgress { .. }) && self.terminal {
-            write(format_args!("\r{:>10.3} ms   {text}", event.at.0 as f64 / 1e6));
+            draw(format_args!("\r"));
+            write(format_args!("{:>10.3} ms   {text}", event.at.0 as f64 / 1e6));
             self.line_open = true;
         } else {
             self.timed(event.at, " ", Some(name_of(&event.event)), &text);

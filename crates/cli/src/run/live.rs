@@ -12,7 +12,7 @@ use ringcat::{
     SupervisorThread,
 };
 
-use crate::output::{is_terminal, write};
+use crate::output::{draw, is_terminal, write};
 use crate::times::us;
 
 /// Time between two drawings.
@@ -61,7 +61,7 @@ impl Live {
     pub fn clear(&mut self) {
         if self.drawn > 0 {
             // To the first line of the table, then clear to the end of the screen (ECMA-48: CPL, ED).
-            write(format_args!("\x1b[{}F\x1b[J", self.drawn));
+            draw(format_args!("\x1b[{}F\x1b[J", self.drawn));
             self.drawn = 0;
         }
     }

@@ -98,7 +98,7 @@ fn accept(listener: &UnixListener, sender: &Sender<Order>) {
             let _ = serve(BufReader::new(connection), &mut output, &sender, |_, answer| answer.to_owned());
         });
         if let Err(error) = served {
-            eprintln!("ringcat sim: a control connection is not served: {error}");
+            output::complain(format_args!("ringcat sim: a control connection is not served: {error}"));
         }
     }
 }

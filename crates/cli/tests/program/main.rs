@@ -13,3 +13,4 @@ mod json;
 mod pages;
 #[cfg(feature = "standby")]
 mod service;
+mod terminal;

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use ringcat_engine::config::{StartupAction, SubDeviceConfig};
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::plan;
+use ringcat_wire::sii::Pdo;
 
 use super::process_data;
 
@@ -39,7 +40,7 @@ pub(super) fn differences(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> V
     let writes_pdos = declared.startup.iter().any(|command| process_data::writes_pdos(&command.action));
     let mut differences = Vec::new();
     for area in &own.process_data {
-        let got: Vec<u16> = area.pdos.iter().map(|pdo| pdo.index).collect();
+        let mut got: Vec<u16> = area.pdos.iter().map(|pdo| pdo.index).collect();
         // With a length and without PDOs, the SII says nothing about them.
         if got.is_empty() && area.length > 0 {
             continue;
@@ -51,6 +52,7 @@ pub(super) fn differences(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> V
             None if writes_pdos => continue,
             None => &[],
         };
+        got.retain(|index| expected.contains(index) || !is_virtual(*index, info));
         differences.extend(text(expected, &got, info).map(|text| (number, format!("SM {number}: {text}"))));
     }
     differences
@@ -71,6 +73,12 @@ fn wanted(declared: &SubDeviceConfig) -> BTreeMap<u8, Option<Vec<u16>>> {
         wanted.insert(it.sync_manager, Some(it.pdos.iter().map(|pdo| pdo.index).collect()));
     }
     wanted
+}
+
+/// Whether a PDO is for tools only: the SII lists it, the SubDevice has no object for it (protocol ES-47). A
+/// declaration from a description does not have it.
+fn is_virtual(index: u16, info: &SubDeviceInfo) -> bool {
+    info.pdo(index).is_some_and(|pdo| pdo.flags & Pdo::VIRTUAL != 0)
 }
 
 /// How two assignments differ, with the PDOs that the SubDevice does not describe.

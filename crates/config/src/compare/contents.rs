@@ -7,7 +7,7 @@ use ringcat_engine::config::{
 };
 use ringcat_engine::declared::SubDeviceId;
 use ringcat_engine::info::{PdoInfo, SubDeviceInfo};
-use ringcat_engine::plan;
+use ringcat_engine::{PlanWarning, plan};
 
 use super::assignment;
 use super::difference::{Difference, DifferenceKind, Stated};
@@ -50,6 +50,13 @@ impl Both<'_> {
                 // An ENI has its own SyncManagers, which are written; a network file takes those of the SII.
                 add(DifferenceKind::Mailbox, declared.declared.is_some(), text);
             }
+        } else if declared.declared.is_some()
+            && let Ok(planned) = plan(declared, info)
+            && planned.warnings.contains(&PlanWarning::MailboxOfSii)
+        {
+            let got = words(planned.mailbox_layout().as_ref().map(buffers));
+            let text = format!("the file has no mailboxes, got {got}: those of the SII are used");
+            add(DifferenceKind::Mailbox, false, text);
         }
         for (kind, prevents_op, text) in properties::differences(declared, stated, info) {
             add(kind, prevents_op, text);

@@ -13,19 +13,13 @@ const TIME: usize = 4;
 
 /// The registers of SYNC0 and SYNC1, the activation last.
 pub(super) fn registers(sync: &SyncSignals) -> Vec<(&'static str, RegisterAddress, Vec<u8>)> {
-    let cycles = [sync.sync0_cycle_ns.to_le_bytes(), register_1(sync).to_le_bytes()].concat();
+    let cycles = [sync.sync0_cycle_ns.to_le_bytes(), sync.sync1_register_ns().to_le_bytes()].concat();
     vec![
         ("set DC cycle time", map::DC_SYNC0_CYCLE, cycles),
         // The MainDevice that reads the file writes the time.
         ("set DC start time", map::DC_START_TIME, vec![0; 8]),
         ("set DC activation", map::DC_CYCLIC_UNIT_CONTROL, sync.assign_activate.to_le_bytes().to_vec()),
     ]
-}
-
-/// The SYNC1 register counts from SYNC0 (protocol 7.3).
-fn register_1(sync: &SyncSignals) -> u32 {
-    let behind = sync.sync1_cycle_ns.saturating_sub(sync.sync0_cycle_ns);
-    behind.saturating_add_signed(sync.sync1_shift_ns)
 }
 
 /// The SubDevice with the reference clock.
@@ -44,7 +38,7 @@ pub(super) fn of_subdevice(whole: &Configuration, index: usize) -> Option<Distri
         place: Place::default(),
         reference,
         cycle_0_ns: sync.map_or(0, |sync| sync.sync0_cycle_ns),
-        cycle_1_ns: sync.map_or(0, |sync| register_1(&sync)),
+        cycle_1_ns: sync.map_or(0, |sync| sync.sync1_register_ns()),
         shift_ns: sync.map_or(0, |sync| sync.sync0_shift_ns),
     })
 }

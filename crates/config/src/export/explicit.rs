@@ -95,10 +95,20 @@ fn limits(config: &mut SubDeviceConfig) {
     }
 }
 
-/// A SYNC1 with the cycle of SYNC0 has no cycle of its own in the registers (protocol 7.3).
+/// Cycle and shift of SYNC1 are one register (protocol 7.3), which only an activated SYNC1 has. A SYNC1 without a cycle
+/// has that of SYNC0, and a negative shift counts back from the next SYNC0.
 fn signals(config: &mut SubDeviceConfig) {
-    if let Some(sync) = config.sync.as_mut().filter(|sync| sync.sync1_cycle_ns == sync.sync0_cycle_ns) {
-        sync.sync1_cycle_ns = 0;
+    const SYNC1: u16 = 0x0400;
+    let Some(sync) = &mut config.sync else { return };
+    if sync.assign_activate & SYNC1 == 0 {
+        (sync.sync1_cycle_ns, sync.sync1_shift_ns) = (0, 0);
+        return;
+    }
+    if sync.sync0_cycle_ns > 0 {
+        sync.sync1_cycle_ns = sync.sync1_cycle_ns.max(sync.sync0_cycle_ns);
+        let cycle = i64::from(sync.sync0_cycle_ns);
+        let shift = i64::from(sync.sync1_shift_ns).rem_euclid(cycle);
+        sync.sync1_shift_ns = i32::try_from(shift).unwrap_or(sync.sync1_shift_ns);
     }
 }
 

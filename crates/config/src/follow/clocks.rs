@@ -49,12 +49,13 @@ fn from_element(clock: &DistributedClock) -> SyncSignals {
     signals(assign_activate, clock.cycle_0_ns, clock.cycle_1_ns, clock.shift_ns)
 }
 
-/// The SYNC1 register counts from SYNC0: whole cycles are its division, the rest is its shift.
+/// The SYNC1 register counts from SYNC0: whole cycles are its division, the rest is its shift. With less than a cycle
+/// SYNC1 has the cycle of SYNC0.
 fn signals(assign_activate: u16, cycle_0: u32, register_1: u32, shift: i32) -> SyncSignals {
     let mut signals = SyncSignals::sync0(cycle_0, shift).with_assign_activate(assign_activate);
     if assign_activate & SYNC1_ON != 0 && cycle_0 > 0 {
         let cycles = register_1 / cycle_0;
-        signals.sync1_cycle_ns = if cycles == 0 { 0 } else { cycle_0.saturating_add(cycles.saturating_mul(cycle_0)) };
+        signals.sync1_cycle_ns = cycle_0.saturating_add(cycles.saturating_mul(cycle_0));
         signals.sync1_shift_ns = i32::try_from(register_1 % cycle_0).unwrap_or(i32::MAX);
     }
     signals

@@ -14,8 +14,8 @@ use crate::eni::{Eni, EniError, MailboxBuffer, Place, ProcessData, SyncManagerKi
 /// Control bytes of mailboxes without a command that sets them (protocol 3.11): one buffer, event to the PDI.
 const MAILBOX_OUT: u8 = 0x26;
 const MAILBOX_IN: u8 = 0x22;
-/// Maximum number of bits of one entry in the engine; longer entries are split.
-const ENTRY_BITS: u16 = 248;
+/// Bits of a piece of an entry that is longer than the 255 bits of one entry in the engine.
+const PIECE_BITS: u16 = 248;
 
 /// All SyncManagers of a SubDevice; `None`: use those of the SII.
 pub(super) fn declared(
@@ -183,9 +183,9 @@ fn empty_pdos(one: &DeclaredSyncManager, process_data: &ProcessData) -> Vec<PdoM
 
 /// An entry, split if it is longer than an object dictionary allows (`ARRAY [0..99] OF BYTE`).
 pub(super) fn entries(entry: &crate::eni::PdoEntry) -> impl Iterator<Item = PdoEntry> + '_ {
-    let pieces = entry.bit_length.div_ceil(ENTRY_BITS);
-    (0..pieces).map(move |piece| {
-        let bits = (entry.bit_length - piece * ENTRY_BITS).min(ENTRY_BITS);
+    let most = if entry.bit_length > u8::MAX.into() { PIECE_BITS } else { u8::MAX.into() };
+    (0..entry.bit_length.div_ceil(most)).map(move |piece| {
+        let bits = (entry.bit_length - piece * most).min(most);
         // The first piece has the name, the others are gaps that follow it.
         let (index, sub_index) = if piece == 0 { (entry.index, entry.sub_index) } else { (0, 0) };
         PdoEntry::new(index, sub_index, bits as u8)

@@ -8,9 +8,6 @@ use ringcat_engine::info::SubDeviceInfo;
 use super::model::{Buffer, Entry, Pdo, SubDevice};
 use crate::esi::{self, Device, PlacedModule, SyncManagerRole};
 
-/// Entries of a description that are longer are split in a network file.
-const ENTRY_BITS: u16 = 248;
-
 impl SubDevice {
     /// The differences to a description, each once: its revision, mailboxes, SyncManagers and operation modes of the
     /// clock, entries of PDOs, PDOs that only one of them assigns. `info` is what the scan found, `modules` are those
@@ -161,7 +158,8 @@ fn of_mailbox(name: &str, buffer: Buffer, device: &Device, role: SyncManagerRole
 
 /// The first entry that differs.
 fn of_entries(entries: &[Entry], described: &[esi::PdoEntry]) -> Option<String> {
-    if described.iter().any(|it| it.bit_length > ENTRY_BITS) {
+    // These are split.
+    if described.iter().any(|it| it.bit_length > u8::MAX.into()) {
         return None;
     }
     let own = entries.iter().map(|it| (it.index, it.sub, u16::from(it.bits)));

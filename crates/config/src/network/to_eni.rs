@@ -80,9 +80,38 @@ fn is_scanned(of: &SubDevice) -> bool {
     !of.ports.is_empty() || of.mailbox.is_some()
 }
 
+/// Mailboxes that a file leaves to the EEPROM. A SubDevice whose ports the file has was scanned or described: it has
+/// none.
+fn mailboxes(file: &NetworkFile) -> Vec<LeftOut> {
+    let subdevices = (0..).zip(&file.subdevice).filter(|(_, of)| of.mailbox.is_none());
+    let (with_commands, others): (Vec<_>, Vec<_>) = subdevices.partition(|(_, of)| of.startup.iter().any(is_mail));
+    let advice = "`ringcat init` and `ringcat esi declare` write the table `[subdevice.mailbox]`";
+    let reason = format!(
+        "start-up commands need one, and the file leaves it to the EEPROM, where RingCAT finds it; other MainDevices \
+         cannot send them: {advice}"
+    );
+    let mut left_out: Vec<_> =
+        with_commands.iter().map(|(index, _)| LeftOut::new(*index, "mailbox", reason.clone())).collect();
+    let unknown = others.iter().filter(|(_, of)| !is_scanned(of)).count();
+    if unknown > 0 {
+        let reason = format!(
+            "the file does not say whether {unknown} of {} SubDevices have mailboxes: the ENI has none, RingCAT takes \
+             those of the EEPROMs, with other MainDevices such a SubDevice may refuse PREOP; {advice}",
+            file.subdevice.len()
+        );
+        left_out.push(LeftOut::new(None, "mailbox", reason));
+    }
+    left_out
+}
+
+/// Whether a start-up command is sent through a mailbox.
+fn is_mail(command: &model::Startup) -> bool {
+    command.write.is_none() && command.check.is_none()
+}
+
 /// What only network files have.
 fn of_file(file: &NetworkFile) -> Vec<LeftOut> {
-    let mut left_out = Vec::new();
+    let mut left_out = mailboxes(file);
     if file.redundancy != model::Redundancy::default() {
         let reason = "an ENI does not name rings: options of the MainDevice declare them";
         left_out.push(LeftOut::new(None, "redundancy", reason));

@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 
-use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
+use encoding_rs::{DecoderResult, Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
 use super::error::{Place, XmlError, XmlProblem};
 use super::limits::MAX_BYTES;
@@ -19,6 +19,7 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Cow<'_, str>, XmlError> {
     if bytes.len() > MAX_BYTES {
         return Err(XmlError::of_file(XmlProblem::TooMuch { what: "bytes", limit: MAX_BYTES }));
     }
+    other_widths(bytes)?;
     let (encoding, mark) = match Encoding::for_bom(bytes) {
         Some(found) => found,
         None => {
@@ -72,6 +73,19 @@ fn place(bytes: &[u8], at: usize) -> Place {
     Place { line: line as u32, column: column as u32 }
 }
 
+/// Encodings that XML files of tools do not have, and that no declaration shows: UTF-32 with and without a byte order
+/// mark, EBCDIC by the beginning `<?xm` of a declaration.
+fn other_widths(bytes: &[u8]) -> Result<(), XmlError> {
+    let encoding = match bytes {
+        [0xFF, 0xFE, 0, 0, ..] | [b'<', 0, 0, 0, ..] => "UTF-32LE",
+        [0, 0, 0xFE, 0xFF, ..] | [0, 0, 0, b'<', ..] => "UTF-32BE",
+        [0x4C, 0x6F, 0xA7, 0x94, ..] => "EBCDIC",
+        _ => return Ok(()),
+    };
+    let reason = format!("the bytes are in {encoding}, which is not read: save the file as UTF-8");
+    Err(XmlError::at(Place { line: 1, column: 1 }, XmlProblem::Encoding { reason }))
+}
+
 /// The encoding of a file without byte order mark.
 fn without_mark(bytes: &[u8]) -> Result<&'static Encoding, XmlError> {
     match bytes {
@@ -99,19 +113,38 @@ fn declared(bytes: &[u8]) -> Option<String> {
     Some(value[1..].split(quote).next()?.to_owned())
 }
 
-/// The error for the first line that is not in the encoding.
+/// The error for the first place that is not in the encoding.
 fn not_in(encoding: &'static Encoding, bytes: &[u8]) -> XmlError {
-    if bytes.trim_ascii_start().first() != Some(&b'<') {
+    let is_wide = encoding == UTF_16LE || encoding == UTF_16BE;
+    let begin: Vec<u8> = bytes.iter().copied().filter(|byte| !is_wide || *byte != 0).take(DECLARATION).collect();
+    if begin.trim_ascii_start().first() != Some(&b'<') {
         return XmlError::of_file(XmlProblem::NotXml);
     }
-    let reason = format!(
-        "the bytes are not in {}: save the file as UTF-8, or declare the encoding that it has (windows-1252?)",
-        encoding.name()
-    );
-    let problem = XmlProblem::Encoding { reason };
-    if encoding != UTF_8 {
-        return XmlError::of_file(problem);
+    let name = encoding.name();
+    let reason = if is_wide {
+        format!("a character is not complete in {name}: the file is damaged or truncated; copy or export it again")
+    } else {
+        format!(
+            "the bytes are not in {name}: save the file as UTF-8, or declare the encoding that it has (windows-1252?)"
+        )
+    };
+    XmlError::at(end_of_text(encoding, bytes), XmlProblem::Encoding { reason })
+}
+
+/// The place behind the last character that can be decoded.
+fn end_of_text(encoding: &'static Encoding, bytes: &[u8]) -> Place {
+    let mut decoder = encoding.new_decoder_without_bom_handling();
+    let (mut line, mut column, mut at) = (1_u32, 1_u32, 0);
+    let mut buffer = [0_u8; 4096];
+    loop {
+        let rest = bytes.get(at..).unwrap_or_default();
+        let (result, read, written) = decoder.decode_to_utf8_without_replacement(rest, &mut buffer, true);
+        at += read;
+        for c in String::from_utf8_lossy(&buffer[..written]).chars() {
+            (line, column) = if c == '\n' { (line + 1, 1) } else { (line, column + 1) };
+        }
+        if result != DecoderResult::OutputFull {
+            return Place { line, column };
+        }
     }
-    let valid = std::str::from_utf8(bytes).err().map_or(0, |error| error.valid_up_to());
-    XmlError::at(place(bytes, valid), problem)
 }

@@ -72,6 +72,53 @@ fn wrong_encodings_and_other_files_are_named() {
     }
 }
 
+/// The bytes of a text in units of UTF-16, UTF-32.
+fn wide(text: &str, bytes_of: impl Fn(char) -> Vec<u8>) -> Vec<u8> {
+    text.chars().flat_map(bytes_of).collect()
+}
+
+// covers: esi-read, ES-05
+#[test]
+fn encodings_that_are_not_read_or_damaged_are_named_with_their_line() {
+    let text = "<?xml version=\"1.0\"?>\n<EtherCATInfo>\n<Vendor>x</Vendor></EtherCATInfo>";
+    let units = |c: char, at: fn(u16) -> [u8; 2]| -> Vec<u8> {
+        c.encode_utf16(&mut [0; 2]).iter().flat_map(|unit| at(*unit)).collect()
+    };
+    for (name, mark, at) in [
+        ("UTF-16LE", [0xFF, 0xFE], u16::to_le_bytes as fn(u16) -> [u8; 2]),
+        ("UTF-16BE", [0xFE, 0xFF], u16::to_be_bytes),
+    ] {
+        let whole = wide(text, |c| units(c, at));
+        // Half a surrogate pair in place of the x, and half a unit at the end, with and without a byte order mark.
+        let place = 2 * (text.find(">x<").expect("it is there") + 1);
+        let mut half = whole.clone();
+        half[place..place + 2].copy_from_slice(&at(0xD800));
+        let truncated = &whole[..whole.len() - 1];
+        for bytes in [&half[..], truncated] {
+            for marked in [bytes.to_vec(), [&mark[..], bytes].concat()] {
+                let error = refusal(&marked);
+                assert!(error.starts_with("bad.xml:3: not readable as text: "), "{error}");
+                assert!(error.contains(&format!("a character is not complete in {name}")), "{error}");
+            }
+        }
+    }
+    for (name, mark, at) in [
+        ("UTF-32LE", [0xFF, 0xFE, 0, 0], u32::to_le_bytes as fn(u32) -> [u8; 4]),
+        ("UTF-32BE", [0, 0, 0xFE, 0xFF], u32::to_be_bytes),
+    ] {
+        let whole = wide(text, |c| at(c.into()).to_vec());
+        for bytes in [whole.clone(), [&mark[..], &whole].concat()] {
+            let error = refusal(&bytes);
+            assert!(error.starts_with(&format!("bad.xml:1: not readable as text: the bytes are in {name}")), "{error}");
+        }
+    }
+    let ebcdic = [0x4C, 0x6F, 0xA7, 0x94, 0x93, 0x40, 0xA5, 0x85, 0x99];
+    assert!(refusal(ebcdic).starts_with("bad.xml:1: not readable as text: the bytes are in EBCDIC"));
+    let korean = [&b"<?xml version=\"1.0\" encoding=\"EUC-KR\"?>\n<EtherCATInfo>\n"[..], &[0xC7, 0xFF, b'<']].concat();
+    let error = refusal(korean);
+    assert!(error.starts_with("bad.xml:3: not readable as text: the bytes are not in EUC-KR"), "{error}");
+}
+
 // covers: esi-read, ES-10, ES-11, ES-25
 #[test]
 fn values_out_of_range_and_duplicates_name_line_and_device() {

@@ -195,7 +195,8 @@ fn mailboxes_that_a_description_cannot_express_are_notices() {
     assert!(made.text.contains("<CoE") && made.text.contains("<Mailbox"), "{}", made.text);
     let mailboxes = "the mailboxes of the fixed area, 0x1000 (96 bytes) and 0x1080 (128 bytes), are not those of the \
                      SyncManagers, 0x1000 (128 bytes) and 0x1080 (128 bytes), which the description has";
-    assert_eq!(made.notices, [mailboxes, "the protocols 0x0080 have no element in a description"]);
+    let coe = "general: CoE features: 0x00 has no place in a description; an image made of it has 0x01";
+    assert_eq!(made.notices, [mailboxes, "the protocols 0x0080 have no element in a description", coe]);
 }
 
 /// All real descriptions.

@@ -11,6 +11,7 @@ mod names;
 mod reading;
 mod real_files;
 mod select;
+mod skeletons;
 mod slots;
 
 /// A coupler, a terminal without mailbox, one with CoE and a dictionary, a modular drive.

@@ -2,6 +2,7 @@
 
 mod commands;
 mod empty_pdos;
+mod limits;
 mod networks;
 mod refusals;
 mod revisions;

@@ -1,6 +1,6 @@
 //! What an ENI cannot express: refused with SubDevice, setting and reason, or listed.
 
-use ringcat_config::network::model::Target;
+use ringcat_config::network::model::{Startup, Target};
 use ringcat_config::network::{NetworkFile, Time};
 use ringcat_config::{Configuration, ExportDetails, ExportOptions, export};
 use ringcat_engine::config::{RegisterAccess, RegisterCommand, StartupAction, StartupCommand, Transition};
@@ -80,6 +80,7 @@ fn settings_that_an_eni_has_no_place_for_are_listed() {
     let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
     let listed: Vec<_> = export.left_out.iter().map(|it| (it.subdevice, it.what.as_str())).collect();
     let expected = [
+        (None, "mailbox"),
         (None, "redundancy"),
         (Some(DRIVE), "firmware"),
         (None, "domain/send_again"),
@@ -87,7 +88,32 @@ fn settings_that_an_eni_has_no_place_for_are_listed() {
         (Some(DRIVE), "timeouts"),
     ];
     let order = (Some(DRIVE), "order of the start-up commands at PS");
-    assert_eq!(listed, [&expected[..2], &[order, (Some(4), "sync_manager")], &expected[2..]].concat());
+    assert_eq!(listed, [&expected[..3], &[order, (Some(4), "sync_manager")], &expected[3..]].concat());
     let plain = network(CELL).to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!(plain.left_out.len(), 2, "{:?}", plain.left_out);
+    assert_eq!(plain.left_out.len(), 3, "{:?}", plain.left_out);
+}
+
+/// A file that says nothing of mailboxes may have been written by hand. One with the ports of a SubDevice was made from
+/// a scan or a description.
+// covers: eni-run
+#[test]
+fn mailboxes_that_are_left_to_the_eeprom_are_listed_where_one_may_be_lacking() {
+    let listed = |file: &NetworkFile| -> Vec<(Option<usize>, String)> {
+        let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        let left_out = export.left_out.into_iter().filter(|it| it.what == "mailbox");
+        left_out.map(|it| (it.subdevice, it.reason)).collect()
+    };
+    let mut file = network(CELL);
+    let [(None, whole)] = &listed(&file)[..] else { panic!("{:?}", listed(&file)) };
+    assert!(whole.contains("whether 2 of 5 SubDevices have mailboxes") && whole.contains("ringcat init"), "{whole}");
+    for subdevice in &mut file.subdevice {
+        subdevice.ports = "YY".to_owned();
+    }
+    assert_eq!(listed(&file), [], "a simple terminal of a scan");
+    file.subdevice[1].mailbox = None;
+    let [(Some(1), of_drive)] = &listed(&file)[..] else { panic!("{:?}", listed(&file)) };
+    assert!(of_drive.contains("start-up commands need one"), "{of_drive}");
+    let registers = |it: &Startup| it.write.is_some() || it.check.is_some();
+    file.subdevice[1].startup.retain(registers);
+    assert_eq!(listed(&file), [], "commands to registers need none");
 }

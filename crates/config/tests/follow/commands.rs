@@ -175,7 +175,7 @@ fn long_entries_are_split_and_pdos_that_do_not_fit_have_no_positions() {
 #[test]
 fn sync_signals_result_from_the_registers_and_the_shift_from_the_element() {
     let configuration = configured(SMALL);
-    let expected = SyncSignals::sync0(1_000_000, -20_000).with_assign_activate(0x0700).with_sync1(0, 250_000);
+    let expected = SyncSignals::sync0(1_000_000, -20_000).with_assign_activate(0x0700).with_sync1(1_000_000, 250_000);
     assert_eq!(drive(&configuration).sync, Some(expected));
     assert_eq!(expected.sync1_register_ns(), 250_000);
     // 2,250,000 ns: SYNC1 occurs with every third SYNC0, a quarter of a cycle later.

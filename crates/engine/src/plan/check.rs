@@ -12,7 +12,7 @@ use super::error::PlanProblem;
 use super::subdevice::{AreaPlan, SmPlan};
 use crate::config::{
     FileRead, FileWrite, IdnRead, IdnWrite, MailMessage, SdoDownload, SdoUpload, StartupAction, StartupCommand,
-    SubDeviceConfig, Transition,
+    Transition,
 };
 use crate::info::SubDeviceInfo;
 use crate::order::InOrder;
@@ -63,8 +63,7 @@ pub(super) struct SupportedProtocols {
 
 impl SupportedProtocols {
     /// From the SII; a configuration file that declares the mailboxes overrides it.
-    pub(super) fn new(config: &SubDeviceConfig, info: &SubDeviceInfo, mailbox: bool) -> SupportedProtocols {
-        let declared = config.declared.is_some();
+    pub(super) fn new(declared: bool, info: &SubDeviceInfo, mailbox: bool) -> SupportedProtocols {
         let protocols = info.protocols;
         SupportedProtocols {
             coe: mailbox && (declared || protocols.coe()),

@@ -226,7 +226,7 @@ pub enum PlanProblem {
     },
 }
 
-/// A declaration that the SII does not permit. The process data is planned as declared.
+/// A declaration that the SII does not permit, or that it completes. The process data is planned as declared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum PlanWarning {
@@ -246,6 +246,8 @@ pub enum PlanWarning {
         /// Index of the PDO.
         pdo: u16,
     },
+    /// A configuration file has no mailboxes, the SII has some: these are used.
+    MailboxOfSii,
 }
 
 impl fmt::Display for PlanError {
@@ -375,6 +377,9 @@ impl fmt::Display for PlanWarning {
             }
             PlanWarning::FixedMapping { pdo } => {
                 write!(f, "PDO {pdo:#06x}: the declared mapping differs from that of the SubDevice, which is fixed")
+            }
+            PlanWarning::MailboxOfSii => {
+                f.write_str("the file has no mailboxes, the SubDevice does: those of its SII are used")
             }
         }
     }

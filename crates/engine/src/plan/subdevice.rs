@@ -84,7 +84,7 @@ pub struct SubDevicePlan {
     pub lrw_supported: bool,
     /// Watchdog registers to write before SAFEOP.
     pub watchdog: Vec<(RegisterAddress, Vec<u8>)>,
-    /// Declarations that the SII does not permit.
+    /// Declarations that the SII does not permit, or that it completes.
     pub warnings: Vec<PlanWarning>,
 }
 

@@ -44,8 +44,20 @@ pub struct Pdo<'a> {
 impl<'a> Pdo<'a> {
     /// Bytes of a PDO without its entries.
     pub const HEADER_LEN: usize = 8;
+    /// Bit of [`Pdo::flags`]: the PDO has to be assigned.
+    pub const MANDATORY: u16 = 0x0001;
+    /// Bit of [`Pdo::flags`]: the PDO has several samples of a cycle.
+    pub const OVERSAMPLING: u16 = 0x0004;
     /// Bit of [`Pdo::flags`]: the entries of the PDO cannot be changed.
     pub const FIXED: u16 = 0x0010;
+    /// Bit of [`Pdo::flags`]: the PDO is for tools, the SubDevice has no object for it.
+    pub const VIRTUAL: u16 = 0x0020;
+    /// Bit of [`Pdo::flags`]: the index depends on the slot.
+    pub const BY_SLOT: u16 = 0x0200;
+    /// Bit of [`Pdo::flags`]: the index depends on the group of the slot.
+    pub const BY_SLOT_GROUP: u16 = 0x0400;
+    /// Bit of [`Pdo::flags`]: modules replace the PDO.
+    pub const OVERWRITTEN_BY_MODULE: u16 = 0x0800;
 
     /// Its entries in order.
     pub const fn entries(&self) -> PdoEntries<'a> {

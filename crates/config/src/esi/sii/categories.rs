@@ -12,13 +12,6 @@ use crate::esi::model::{Device, FmmuRole, Group, Mailbox, OpMode, Pdo, ScaledTim
 
 /// No SyncManager.
 const NOT_ASSIGNED: u8 = 0xFF;
-/// Flags of a PDO.
-const MANDATORY: u16 = 0x0001;
-const OVERSAMPLING: u16 = 0x0004;
-const VIRTUAL: u16 = 0x0020;
-const BY_SLOT: u16 = 0x0200;
-const BY_GROUP: u16 = 0x0400;
-const OVERWRITTEN: u16 = 0x0800;
 /// A sync unit that tolerates repeated frames.
 const FRAME_REPEAT: u8 = 0xF0;
 
@@ -280,13 +273,13 @@ fn sync_manager(sm: &SyncManager, with_op_only: bool) -> SiiSyncManager {
 
 fn pdo_flags(pdo: &Pdo) -> u16 {
     [
-        (pdo.is_mandatory, MANDATORY),
-        (pdo.oversampling.is_some(), OVERSAMPLING),
+        (pdo.is_mandatory, SiiPdo::MANDATORY),
+        (pdo.oversampling.is_some(), SiiPdo::OVERSAMPLING),
         (pdo.is_fixed, SiiPdo::FIXED),
-        (pdo.is_virtual, VIRTUAL),
-        (pdo.index.by_slot, BY_SLOT),
-        (pdo.index.by_group, BY_GROUP),
-        (pdo.overwritten_by_module, OVERWRITTEN),
+        (pdo.is_virtual, SiiPdo::VIRTUAL),
+        (pdo.index.by_slot, SiiPdo::BY_SLOT),
+        (pdo.index.by_group, SiiPdo::BY_SLOT_GROUP),
+        (pdo.overwritten_by_module, SiiPdo::OVERWRITTEN_BY_MODULE),
     ]
     .into_iter()
     .filter(|(is_set, _)| *is_set)

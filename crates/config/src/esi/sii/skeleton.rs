@@ -1,6 +1,8 @@
 //! A device description from an image: everything that an SII contains (protocol ES-105). Exclude, start-up commands,
 //! dictionaries, modules and further languages are not in an SII.
 
+mod lost;
+
 use std::fmt::{self, Write};
 
 use ringcat_wire::sii::{
@@ -9,10 +11,10 @@ use ringcat_wire::sii::{
 };
 
 use super::data_type::name_of;
+use lost::GENERATED;
 
-/// A category of the vendor.
-const FIRST_OF_VENDOR: u16 = 1;
-const LAST_OF_VENDOR: u16 = 9;
+/// A sync unit that tolerates repeated frames.
+const FRAME_REPEAT: u8 = 0xF0;
 /// Protocols that have an element.
 const PROTOCOLS: u16 = MailboxProtocols::AOE
     | MailboxProtocols::EOE
@@ -26,7 +28,8 @@ const PROTOCOLS: u16 = MailboxProtocols::AOE
 pub struct Skeleton {
     /// Its text.
     pub text: String,
-    /// What a description cannot express about the mailboxes of the image.
+    /// What a description cannot express of the image, its individual fields (alias, serial number, production data)
+    /// aside.
     pub notices: Vec<String>,
 }
 
@@ -39,7 +42,9 @@ pub fn skeleton(image: &[u8]) -> Result<Skeleton, SiiError> {
     let mut out = Xml { text: String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"), depth: 0 };
     // Writing to a string cannot fail.
     let _ = document(&mut out, &sii, image);
-    Ok(Skeleton { text: out.text, notices: not_expressible(&sii) })
+    let mut notices = not_expressible(&sii);
+    notices.extend(lost::notices(image, &sii, &out.text));
+    Ok(Skeleton { text: out.text, notices })
 }
 
 /// Elements with their indentation.
@@ -212,9 +217,11 @@ fn fmmus_and_sync_managers(out: &mut Xml, sii: &Sii<'_>) -> fmt::Result {
             bit(SiiSyncManager::OP_ONLY, "OpOnly"),
         ))?;
     }
-    let units = sii.categories().filter(|category| category.kind.code() == 43).flat_map(|category| category.data);
-    for _ in units.filter(|byte| **byte == 0xF0) {
-        out.line(format_args!("<Su FrameRepeatSupport=\"1\"/>"))?;
+    let units: Vec<u8> = sii.categories().filter(|it| it.kind.code() == 43).flat_map(|it| it.data).copied().collect();
+    // What follows the last one may be padding.
+    let count = units.iter().rposition(|unit| *unit == FRAME_REPEAT).map_or(0, |last| last + 1);
+    for unit in &units[..count] {
+        out.line(format_args!("<Su{}/>", if *unit == FRAME_REPEAT { " FrameRepeatSupport=\"1\"" } else { "" }))?;
     }
     Ok(())
 }
@@ -228,14 +235,22 @@ fn pdos(out: &mut Xml, sii: &Sii<'_>, direction: PdoDirection) -> fmt::Result {
     for pdo in sii.pdos(direction) {
         let flag = |mask: u16, name: &str| if pdo.flags & mask == 0 { String::new() } else { format!(" {name}=\"1\"") };
         let sm = pdo.sync_manager.map(|number| format!(" Sm=\"{number}\"")).unwrap_or_default();
-        let flags = [flag(Pdo::FIXED, "Fixed"), flag(1, "Mandatory"), flag(0x20, "Virtual")].concat();
-        out.open(format_args!("{name}{flags}{sm}"))?;
-        out.leaf("Index", format_args!("#x{:04X}", pdo.index))?;
+        let flags = [
+            flag(Pdo::FIXED, "Fixed"),
+            flag(Pdo::MANDATORY, "Mandatory"),
+            flag(Pdo::VIRTUAL, "Virtual"),
+            // The image does not have the factor.
+            flag(Pdo::OVERSAMPLING, "OSFac"),
+            flag(Pdo::OVERWRITTEN_BY_MODULE, "OverwrittenByModule"),
+        ];
+        let slot = [flag(Pdo::BY_SLOT, "DependOnSlot"), flag(Pdo::BY_SLOT_GROUP, "DependOnSlotGroup")].concat();
+        out.open(format_args!("{name}{}{sm}", flags.concat()))?;
+        out.line(format_args!("<Index{slot}>#x{:04X}</Index>", pdo.index))?;
         out.leaf("Name", text(&strings, pdo.name))?;
         for entry in pdo.entries() {
             out.open(format_args!("Entry"))?;
             out.leaf("Index", format_args!("#x{:04X}", entry.index))?;
-            if !entry.is_gap() {
+            if !entry.is_gap() || entry.sub_index != 0 {
                 out.leaf("SubIndex", entry.sub_index)?;
             }
             out.leaf("BitLen", entry.bit_length)?;
@@ -352,7 +367,7 @@ fn eeprom(out: &mut Xml, sii: &Sii<'_>, image: &[u8]) -> fmt::Result {
     }
     for category in sii.categories() {
         let code = category.kind.code();
-        if (FIRST_OF_VENDOR..=LAST_OF_VENDOR).contains(&code) {
+        if !GENERATED.contains(&code) {
             let data = hex(category.data);
             out.line(format_args!("<Category><CatNo>{code}</CatNo><Data>{data}</Data></Category>"))?;
         }

@@ -97,6 +97,42 @@ fn declared_mailboxes_override_the_protocols_of_the_sii() {
     let silent = SubDeviceInfo { protocols: MailboxProtocols(0), ..device() };
     assert_eq!(problem(&any().sdo(0x8000, 1, [0]), &silent), PlanProblem::NoCoe { index: 0x8000, sub_index: 1 });
     assert!(plan(&with(|_| ()).sdo(0x8000, 1, [0]), &silent).is_ok());
-    let without = with(|declared| declared.retain(|sm| sm.role.direction().is_some())).sdo(0x8000, 1, [0]);
-    assert_eq!(problem(&without, &device()), PlanProblem::NoCoe { index: 0x8000, sub_index: 1 });
+    let none = SubDeviceInfo { mailbox: None, ..device() };
+    let without = with(without_mailboxes).sdo(0x8000, 1, [0]);
+    assert_eq!(problem(&without, &none), PlanProblem::NoCoe { index: 0x8000, sub_index: 1 });
+}
+
+fn without_mailboxes(declared: &mut Vec<DeclaredSyncManager>) {
+    declared.retain(|sm| sm.role.direction().is_some());
+}
+
+/// A SubDevice with mailboxes refuses PREOP without them.
+// covers: sync-managers-declared
+#[test]
+fn mailboxes_that_a_file_does_not_have_are_those_of_the_sii() {
+    let expected = plan(&any(), &device()).unwrap().mailbox;
+    assert_eq!(expected.len(), 2);
+    let empty = with(Vec::clear);
+    for config in [with(without_mailboxes), with(without_mailboxes).sdo(0x8000, 1, [0]), empty] {
+        let planned = plan(&config, &device()).unwrap();
+        assert_eq!((&planned.mailbox, &planned.warnings[..]), (&expected, &[PlanWarning::MailboxOfSii][..]));
+        assert!(planned.unused.iter().all(|index| *index > 1), "{:?}", planned.unused);
+    }
+    let silent = SubDeviceInfo { protocols: MailboxProtocols(0), ..device() };
+    let commands = with(without_mailboxes).sdo(0x8000, 1, [0]);
+    assert_eq!(problem(&commands, &silent), PlanProblem::NoCoe { index: 0x8000, sub_index: 1 }, "the SII says which");
+    // The file uses their SyncManagers, or their memory.
+    let number = |declared: &mut Vec<DeclaredSyncManager>| {
+        without_mailboxes(declared);
+        declared[0].index = 1;
+    };
+    let memory = |declared: &mut Vec<DeclaredSyncManager>| {
+        without_mailboxes(declared);
+        declared[0].register = sync_manager(0x1000, 6, 0x20);
+    };
+    for config in [with(number), with(memory)] {
+        let planned = plan(&config, &device()).unwrap();
+        assert_eq!((&planned.mailbox[..], &planned.warnings[..]), (&[][..], &[][..]));
+    }
+    assert_eq!(plan(&with(without_mailboxes), &SubDeviceInfo { mailbox: None, ..device() }).unwrap().warnings, []);
 }

@@ -4,14 +4,16 @@
 use std::path::Path;
 use std::time::Duration;
 
-use ringcat::config::network::model::Sync;
-use ringcat::config::{Export, ExportDetails, ExportOptions, LrwUse, export};
+use ringcat::config::network::Bytes;
+use ringcat::config::network::model::{Sdo, Startup, Sync};
+use ringcat::config::{DifferenceKind, Export, ExportDetails, ExportOptions, FoundNetwork, LrwUse, export};
 use ringcat::eni::EniFile;
 use ringcat::network::{NetworkFile, ScanOptions};
 use ringcat::simulated::SimulatedSegment;
-use ringcat::{MainDevice, Options, SyncSignals};
+use ringcat::{Application, Event, MainDevice, Options, SyncSignals};
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
+use ringcat_wire::al::AlState;
 use scenarios::dice::Dice;
 
 use super::{Plant, REAL, activate_on, machine, real, start};
@@ -94,4 +96,50 @@ fn an_exported_eni_reaches_op_on_the_segment_of_the_eni_it_was_made_of() {
         let [outputs, inputs] = proven(activate_on(network, read(&export), false).expect("its segment"), seed);
         assert!(outputs + inputs > 8, "{outputs} outputs, {inputs} inputs");
     }
+}
+
+/// The differences that `ringcat compare --eni` names, and whether they prevent OP.
+fn differences(file: &EniFile, bus: &str) -> Vec<(DifferenceKind, bool)> {
+    let links = SimulatedSegment::from_toml(bus).expect("the segment is valid");
+    let scan = MainDevice::request(links, &Options::default()).scan().expect("the scan succeeds");
+    let found = FoundNetwork { subdevices: &scan.subdevices, topology: &scan.topology, firmware: &[] };
+    let all = file.configuration.differences(found, &file.stated());
+    all.into_iter().map(|it| (it.kind, it.prevents_op)).collect()
+}
+
+/// Written by hand, or with the tables of the mailboxes removed: with the ENI the drives refused PREOP (0x0016).
+// covers: eni-run
+#[test]
+fn an_eni_without_mailboxes_reaches_op_with_those_of_the_eeproms() {
+    let mut file = scanned();
+    let drives = file.subdevice.iter_mut().filter_map(|it| it.mailbox.take()).count();
+    assert_eq!(drives, 2);
+    let second = 5;
+    let sdo = Sdo { index: 0x6060, data: Bytes(vec![9]), ..Sdo::default() };
+    file.subdevice[second].startup.push(Startup { sdo: Some(sdo), ..Startup::default() });
+    let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let left: Vec<_> = export.left_out.iter().filter(|it| it.what == "mailbox").map(|it| it.subdevice).collect();
+    assert_eq!(left, [Some(second)], "{:?}", export.left_out);
+    let eni = read(&export);
+    assert_eq!(differences(&eni, BUS), [(DifferenceKind::Mailbox, false); 2]);
+    let mut plant = activate_on(network(BUS), eni, false).expect("the network is the one of the file");
+    plant.settle();
+    plant.compare(&mut Dice::new(7));
+    let named = |event: &&Event| matches!(event, Event::PlanOddity { what, .. } if what.contains("no mailboxes"));
+    assert_eq!(plant.events.iter().filter(named).count(), 2, "{:?}", plant.events);
+    // Without process data, too.
+    for subdevice in &mut file.subdevice {
+        subdevice.sync_manager.clear();
+    }
+    let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let mut application = start(network(BUS), read(&export), false).expect("it is activated").application;
+    let until = application.now() + Duration::from_secs(10);
+    let states = |application: &Application<SimulatedSegment>| {
+        let devices = application.links().network().devices();
+        devices.filter(|device| device.al_status().state != AlState::Init.code()).count()
+    };
+    while states(&application) < 6 && application.now() < until {
+        application.cycle(|_| ());
+    }
+    assert_eq!(states(&application), 6, "all of them accept PREOP");
 }

@@ -1,0 +1,44 @@
+//! What a terminal would obey instead of showing it: control characters in files and in their names.
+
+use crate::files::{Place, Said, ringcat};
+
+/// Red letters: ESC and CSI of one character (ECMA-48), in a comment, a type, a name and a wrong value.
+const ESI: &str = "<?xml version=\"1.0\"?>\n<EtherCATInfo><Vendor><Id>1</Id><Name>a\u{9b}31mb</Name></Vendor>\
+                   <Descriptions><Groups><Group><Type>G</Type><Name>G\u{9b}31m</Name></Group></Groups><Devices>\
+                   <Device Physics=\"YY\"><Type ProductCode=\"#x1\" RevisionNo=\"#x1\">T\u{9b}31m\u{202e}T</Type>\
+                   <Name>N\u{9b}31m</Name><GroupType>G</GroupType>\
+                   <Eeprom><ByteSize>256</ByteSize><ConfigData>0401000000000000000000000000</ConfigData></Eeprom>\
+                   </Device></Devices></Descriptions></EtherCATInfo>";
+
+fn assert_tame(said: &Said) {
+    let all = [&*said.out, &*said.errors].concat();
+    let wild = all.chars().find(|c| *c == '\u{202e}' || c.is_control() && !matches!(c, '\n' | '\t'));
+    assert_eq!(wild, None, "{:?}", said.all());
+    assert!(all.len() > 20, "{}", said.all());
+}
+
+// covers: verdict, esi-read, eni-read
+#[test]
+fn control_characters_of_files_and_their_names_do_not_reach_the_terminal() {
+    let place = Place::new("terminal");
+    let good = place.write("e\u{1b}[31m\u{9b}.xml", ESI);
+    let bad = place.write("bad\u{1b}[2J.xml", &ESI.replacen("Physics=\"YY\"", "Physics=\"\u{9b}31m\"", 1));
+    let eni = place.write("eni\u{1b}[2J\r.xml", "<?xml version=\"1.0\"?>\n<EtherCATConfig>\u{1b}[31m</EtherCATConfig>");
+    let network = place.write("machine\u{1b}[2J.toml", "ringcat_network = 1\n\"\\u001b[31m\" = 3\n");
+    let folder = place.path("");
+    for (command, expected) in [
+        (&["esi", "list", &folder][..], 0),
+        (&["esi", "show", &good], 0),
+        (&["esi", "show", &bad], 2),
+        (&["sii", "build", &good, "--type", "none", "--out", "-"], 2),
+        (&["eni", &eni], 2),
+        (&["eni", "export", "--network", &network], 2),
+        (&["eni", &place.path("missing\u{1b}[2J.xml")], 2),
+    ] {
+        let said = ringcat(command);
+        assert_tame(&said);
+        assert_eq!(said.code, Some(expected), "{command:?} {:?}", said.all());
+    }
+    let said = ringcat(&["eni", &eni]);
+    assert!(said.verdict().contains("eni\\u{1b}[2J\\r.xml: line 2"), "{}", said.all());
+}
