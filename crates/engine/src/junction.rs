@@ -98,6 +98,8 @@ pub enum JunctionError {
         /// The evidence.
         shown: ClosingEvidence,
     },
+    /// Connections could not be tested: the segment was being scanned, or read after a change, for seconds.
+    NotTested,
 }
 
 /// Evidence that no cable connects the declared ports, from closing both ports for a moment. An intact ring then loses
@@ -153,6 +155,9 @@ impl fmt::Display for JunctionError {
                     "{connection}: SubDevice {tail} port {tail_port} does not lead back to SubDevice {head} port "
                 )?;
                 write!(f, "{head_port}: with these ports closed {shown}")
+            }
+            JunctionError::NotTested => {
+                f.write_str("the junction connections could not be tested: the segment is being scanned or read")
             }
             JunctionError::NoConnection => f.write_str("strict junction redundancy needs at least one connection"),
         }

@@ -23,6 +23,7 @@ use crate::procedures::idle::without_watch;
 use crate::procedures::junction::{Reached, refute};
 use crate::procedures::scan::node_status;
 use crate::role::Function;
+use crate::segment::Found;
 use crate::topology::{Closing, NodeStatus};
 
 impl MainDevice {
@@ -65,45 +66,29 @@ impl MainDevice {
     /// or whose SubDevices are not all present, is accepted without a test. Errors that [`MainDevice::apply`] detects
     /// are not checked here.
     ///
-    /// The result is [`JunctionError::NotThere`] if a ring does not close as declared.
+    /// The result is [`JunctionError::NotThere`] if a ring does not close as declared, [`JunctionError::NotTested`] if
+    /// the segment is being scanned, or read after a change, for longer than ten seconds.
     pub fn start_connection_check(&mut self) -> Pending<Result<(), JunctionError>> {
         let bus = self.supervisor.bus();
-        let declared = self.declared_closings().unwrap_or_default();
+        let is_permitted = self.active().is_none() && self.permit(Function::Activate).is_ok();
+        let loaded = self.loaded.clone().filter(|loaded| is_permitted && !loaded.connections.is_empty());
         let (own, segment) = (bus.clone(), self.segment.clone());
         Pending::start(&own, async move {
-            if declared.closings.is_empty() {
-                return Ok(());
-            }
-            let closings: Vec<Closing> = declared.closings.iter().map(|(_, closing)| *closing).collect();
-            let connections: Vec<JunctionConnection> = declared.closings.iter().map(|(it, _)| *it).collect();
-            let testing = bus.clone();
+            let Some(loaded) = loaded else { return Ok(()) };
+            let (testing, of) = (bus.clone(), segment.clone());
             let test = async move {
+                // By the scan that counts once idle operation has ended its work.
+                let declared = DeclaredClosings::of(&loaded, of.view().found()?);
+                let closings: Vec<Closing> = declared.closings.iter().map(|(_, closing)| *closing).collect();
                 let reached = Reached { nodes: &declared.nodes, stations: &declared.stations };
-                refute(&testing, reached, declared.main_count, &closings).await
+                let (number, shown) = refute((&testing, &of), reached, declared.main_count, &closings).await?;
+                Some(JunctionError::NotThere { connection: declared.closings[number].0, shown })
             };
-            match without_watch(&bus, &segment, test).await.flatten() {
-                Some((number, shown)) => Err(JunctionError::NotThere { connection: connections[number], shown }),
-                None => Ok(()),
+            match without_watch(&bus, &segment, test).await {
+                Some(None) => Ok(()),
+                Some(Some(error)) => Err(error),
+                None => Err(JunctionError::NotTested),
             }
-        })
-    }
-
-    /// The declared rings at their positions in the scan; `None` if these cannot be determined.
-    fn declared_closings(&self) -> Option<DeclaredClosings> {
-        let loaded = self.loaded.as_ref().filter(|_| self.active().is_none())?;
-        let scan = self.segment.view().found()?.clone();
-        let mut found: Vec<Option<Rc<SubDeviceInfo>>> = alloc::vec![None; loaded.declaration.subdevices.len()];
-        for resolution in resolve(&loaded.declaration.subdevices, &scan.subdevices) {
-            if let Resolution::Found { config, info } = resolution {
-                found[config] = Some(scan.subdevices[info].clone());
-            }
-        }
-        let placed = |connection: &JunctionConnection| Some((*connection, closing(connection, &found).ok()?.ok()?));
-        Some(DeclaredClosings {
-            closings: loaded.connections.iter().filter_map(placed).collect(),
-            nodes: scan.subdevices.iter().map(|info| node_status(info)).collect(),
-            stations: scan.stations(),
-            main_count: scan.main_count,
         })
     }
 
@@ -134,10 +119,27 @@ impl MainDevice {
 }
 
 /// Declared rings whose SubDevices are present, with the SubDevices of the scan.
-#[derive(Default)]
 struct DeclaredClosings {
     closings: Vec<(JunctionConnection, Closing)>,
     nodes: Vec<NodeStatus>,
     stations: Vec<StationAddress>,
     main_count: usize,
+}
+
+impl DeclaredClosings {
+    fn of(loaded: &Loaded, scan: &Found) -> DeclaredClosings {
+        let mut found: Vec<Option<Rc<SubDeviceInfo>>> = alloc::vec![None; loaded.declaration.subdevices.len()];
+        for resolution in resolve(&loaded.declaration.subdevices, &scan.subdevices) {
+            if let Resolution::Found { config, info } = resolution {
+                found[config] = Some(scan.subdevices[info].clone());
+            }
+        }
+        let placed = |connection: &JunctionConnection| Some((*connection, closing(connection, &found).ok()?.ok()?));
+        DeclaredClosings {
+            closings: loaded.connections.iter().filter_map(placed).collect(),
+            nodes: scan.subdevices.iter().map(|info| node_status(info)).collect(),
+            stations: scan.stations(),
+            main_count: scan.main_count,
+        }
+    }
 }

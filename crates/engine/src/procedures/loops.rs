@@ -32,7 +32,7 @@ const TRIES: usize = 2;
 const READS: usize = 4;
 
 /// Maximum wait until an opened ring is closed again: temporary loop settings expire within a second.
-const CLOSING_LIMIT: Duration = Duration::from_millis(1_200);
+pub(super) const CLOSING_LIMIT: Duration = Duration::from_millis(1_200);
 /// Interval of the check whether the ring is closed.
 const CLOSING_PAUSE: Duration = Duration::from_millis(1);
 
@@ -87,11 +87,13 @@ pub(super) fn write_of((station, control): (StationAddress, DlControl)) -> (Comm
 }
 
 /// Closes ports for a moment, in one frame, carries out `work`, and restores what the model says. `before`: the present
-/// settings of their SubDevices ([`controls`]). Returns an error, without `work`, if they could not be written.
+/// settings of their SubDevices ([`controls`]). `closing`: how long to wait then until a ring of two links shows to be
+/// closed again; without it the ring is not awaited. Returns an error, without `work`, if they could not be written.
 pub(super) async fn while_closed<T>(
     bus: &Bus,
     segment: &SharedSegment,
     (before, ports): (&[(StationAddress, DlControl)], &[(StationAddress, u8)]),
+    closing: Option<Duration>,
     work: impl Future<Output = T>,
 ) -> Result<T, BusError> {
     segment.observe(Observation::PortsAltered(before));
@@ -102,7 +104,11 @@ pub(super) async fn while_closed<T>(
         Ok(()) => Ok(work.await),
         Err(error) => Err(error),
     };
-    restore(bus, segment).await;
+    let is_restored = restore(bus, segment).await;
+    if let Some(limit) = closing {
+        // Settings that were not restored expire.
+        until_ring_is_closed(bus, if is_restored { limit } else { CLOSING_LIMIT }).await;
+    }
     result
 }
 
@@ -129,19 +135,22 @@ pub(super) async fn controls(
 }
 
 /// Restores what is changed according to the model, if anything is. All in one frame: behind one end of a ring that is
-/// open again, frames are lost until the other end is open too.
-pub(crate) async fn restore(bus: &Bus, segment: &SharedSegment) {
+/// open again, frames are lost until the other end is open too. False if some were not reached: they restore themselves
+/// when the temporary settings expire.
+pub(crate) async fn restore(bus: &Bus, segment: &SharedSegment) -> bool {
+    let mut is_restored = false;
     for _ in 0..TRIES {
         let altered = segment.view().altered();
         if altered.is_empty() {
-            return;
+            return true;
         }
-        if write(bus, altered).await.is_ok() {
+        is_restored = write(bus, altered).await.is_ok();
+        if is_restored {
             break;
         }
     }
-    // Those that were not reached restore themselves when the temporary settings expire.
     segment.observe(Observation::PortsAltered(&[]));
+    is_restored
 }
 
 /// Restores ports at the end of an application, within a quarter of its limit: lost frames must not take the time of
@@ -164,8 +173,8 @@ pub(super) fn closed_at(control: DlControl, station: StationAddress, ports: &[(S
 }
 
 /// Waits until frames on both links have shown that the ring is closed.
-pub(super) async fn until_ring_is_closed(bus: &Bus) {
-    let until = bus.now() + CLOSING_LIMIT;
+async fn until_ring_is_closed(bus: &Bus, limit: Duration) {
+    let until = bus.now() + limit;
     while bus.now() < until {
         bus.sleep(CLOSING_PAUSE).await;
         let _ = bus.brd(map::TYPE, 1).await;

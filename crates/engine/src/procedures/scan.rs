@@ -163,7 +163,8 @@ async fn attempt(
         return Err(ScanError::Changed { before: expected.by_link(), after }.into());
     }
     let (main_count, redundant_count) = (usize::from(expected.main.0), usize::from(expected.redundant.0));
-    let Learned { topology, closings, not_learned } = connect(bus, options.junctions, &subdevices, main_count).await?;
+    let Learned { topology, closings, not_learned } =
+        connect((bus, segment), options.junctions, &subdevices, main_count).await?;
     let mut scan = Scan { subdevices, topology, main_count, redundant_count };
     let mut findings = findings_of(&scan);
     // Declared connections are not known yet.
@@ -223,7 +224,7 @@ pub(super) struct Learned {
 
 /// Determines the connections. The main copy passed the first `main_count` SubDevices.
 pub(super) async fn connect(
-    bus: &Bus,
+    (bus, segment): (&Bus, &SharedSegment),
     junctions: JunctionMode,
     subdevices: &[SubDeviceInfo],
     main_count: usize,
@@ -233,7 +234,7 @@ pub(super) async fn connect(
     let closings = match junctions {
         JunctionMode::Automatic => {
             let reached = Reached { nodes: &statuses, stations: &stations };
-            learn(bus, reached, main_count, bus.ring() == RingState::Closed).await?
+            learn((bus, segment), reached, main_count, bus.ring() == RingState::Closed).await?
         }
         JunctionMode::Disabled | JunctionMode::Strict => Vec::new(),
     };

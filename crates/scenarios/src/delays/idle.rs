@@ -95,7 +95,10 @@ fn compare(main_device: &mut MainDevice<Tap>, reported: &mut Reported, is_comple
     // Delays are relative to the first clock by position, which is the first that the frame reaches.
     for place in from_known(&all, &[]) {
         let of = network.devices().nth(place.device).map(station);
-        let Some(it) = report.iter().find(|it| Some(it.station.0) == of) else { continue };
+        let Some(it) = report.iter().find(|it| Some(it.station.0) == of) else {
+            reported.wrong.push(format!("{what}: device {} is not in the report", place.device));
+            continue;
+        };
         judge(it, &place, all[0].frame, reported, is_complete, what);
     }
 }

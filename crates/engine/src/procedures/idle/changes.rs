@@ -69,14 +69,15 @@ pub(crate) async fn scan_again(
     }
     let main_count = usize::from(now.counts.0.0);
     let infos: Vec<SubDeviceInfo> = subdevices.iter().map(|info| (**info).clone()).collect();
-    let Learned { topology, .. } = connect(bus, options.junctions, &infos, main_count).await?;
+    let Learned { topology, .. } = connect((bus, segment), options.junctions, &infos, main_count).await?;
     if options.junctions == JunctionMode::Automatic {
         // The examination of rings has closed ports for a moment: their ECAT events would cause another scan, and that
         // another examination.
         bus.brd(map::DL_STATUS, DlStatus::LEN).await?;
         let read: Vec<(StationAddress, DlStatus)> = infos.iter().map(|info| (info.station, info.dl_status)).collect();
         if !are_ports_as_before(bus, &read).await? {
-            return Ok(None);
+            // A port that flaps must not keep what is new from being followed.
+            segment.observe_idle(IdleObservation::RescanAsked);
         }
     }
     Ok((seen(bus).await?.as_ref() == Some(&now)).then_some(Found { subdevices, topology, main_count }))

@@ -14,7 +14,7 @@ use crate::supervisor::Bus;
 const LIMIT: Duration = Duration::from_secs(5);
 
 /// Carries out work that closes ports for a moment, to its end also if the caller no longer waits. Broadcasts would show
-/// another segment meanwhile. `None` if it cannot be done now.
+/// another segment meanwhile. `None` if it cannot be done now, or a scan has begun meanwhile.
 pub(crate) async fn without_watch<T: 'static>(
     bus: &Bus,
     segment: &SharedSegment,
@@ -23,22 +23,31 @@ pub(crate) async fn without_watch<T: 'static>(
     let (ended, result) = (bus.signal(), Rc::new(RefCell::new(None)));
     let (own_bus, own_segment, own_ended, own_result) = (bus.clone(), segment.clone(), ended.clone(), result.clone());
     bus.spawn(async move {
-        let done = paused(&own_bus, &own_segment, work).await;
+        // Work that has begun has to end; a caller that has given up does not need it before.
+        let is_wanted = || Rc::strong_count(&own_result) > 1;
+        let done = paused(&own_bus, &own_segment, is_wanted, work).await;
         *own_result.borrow_mut() = Some(done);
         own_ended.notify();
     });
     ended.until(|| result.borrow_mut().take()).await
 }
 
-async fn paused<T>(bus: &Bus, segment: &SharedSegment, work: impl Future<Output = T>) -> Option<T> {
+async fn paused<T>(
+    bus: &Bus,
+    segment: &SharedSegment,
+    is_wanted: impl Fn() -> bool,
+    work: impl Future<Output = T>,
+) -> Option<T> {
     let _turn = segment.disturb(Disturbance::OpenByPort, LIMIT).await?;
     let quiet = segment.until(|model| (!model.is_idle_busy() && !model.is_scanning()).then_some(()));
     bus.within(LIMIT, quiet).await.ok()?;
-    if segment.view().is_active() {
+    if segment.view().is_active() || !is_wanted() {
         return None;
     }
+    let scan = segment.view().scan_number();
     segment.observe_idle(IdleObservation::Measuring);
     let result = work.await;
     segment.observe_idle(IdleObservation::Measured);
-    Some(result)
+    // A scan that began meanwhile has changed the ports as well.
+    Some(result).filter(|_| segment.view().scan_number() == scan && !segment.view().is_scanning())
 }

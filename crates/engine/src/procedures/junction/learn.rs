@@ -19,6 +19,9 @@ use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlControl, LoopControl, map};
 
 use crate::order::InOrder;
+use crate::procedures::loops::lasting;
+use crate::procedures::shared_segment::SharedSegment;
+use crate::segment::Observation;
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{Closing, NodeStatus, PortOf, Topology, candidates_with};
 
@@ -40,7 +43,7 @@ pub(crate) struct Reached<'a> {
 
 /// The closing cables of all local rings, whole or broken; none if they cannot be determined.
 pub(in super::super) async fn learn(
-    bus: &Bus,
+    on: (&Bus, &SharedSegment),
     reached: Reached<'_>,
     main_count: usize,
     ring_closed: bool,
@@ -61,7 +64,7 @@ pub(in super::super) async fn learn(
         // Which SubDevices are behind a break depends on the inner rings, which are tested first.
         set.put_in_order_by_key(|closing| core::cmp::Reverse(closing.head.node));
         for closing in set.iter().filter(|closing| !right.contains(closing)).copied().collect::<Vec<_>>() {
-            match attempt(bus, reached, &topology, closing).await? {
+            match attempt(on, reached, &topology, closing).await? {
                 Tried::Right => right.push(closing),
                 Tried::Wrong { last_silent } => {
                     wrong.push(closing);
@@ -95,13 +98,18 @@ enum Tried {
 }
 
 /// Tests whether a ring closes here.
-async fn attempt(bus: &Bus, reached: Reached<'_>, topology: &Topology, closing: Closing) -> Result<Tried, BusError> {
+async fn attempt(
+    on: (&Bus, &SharedSegment),
+    reached: Reached<'_>,
+    topology: &Topology,
+    closing: Closing,
+) -> Result<Tried, BusError> {
     let Closing { head, tail } = closing;
     let broken = first_behind_break(reached.nodes, topology, closing);
     // SubDevices behind a break are reached through the closing cable only.
     let silent = |node: usize| broken.is_some_and(|first| topology.is_behind(node, first));
     let ports = if broken.is_some() { Vec::from([head]) } else { Vec::from([head, tail]) };
-    let Some(answers) = with_closed(bus, &ports, reached.stations).await? else { return Ok(Tried::NoFrame) };
+    let Some(answers) = with_closed(on, &ports, reached.stations).await? else { return Ok(Tried::NoFrame) };
     if answers.iter().enumerate().all(|(node, is)| *is != silent(node)) {
         return Ok(Tried::Right);
     }
@@ -120,27 +128,28 @@ pub(super) fn first_behind_break(nodes: &[NodeStatus], topology: &Topology, clos
 /// Which SubDevices with these station addresses answer, by position, while these ports are closed; `None` if no frame
 /// returns then.
 pub(super) async fn with_closed(
-    bus: &Bus,
+    (bus, segment): (&Bus, &SharedSegment),
     ports: &[PortOf],
     stations: &[StationAddress],
 ) -> Result<Option<Vec<bool>>, BusError> {
     let of = |port: &PortOf| stations.get(port.node).map(|station| (*station, port.port));
     let ports: Vec<(StationAddress, u8)> = ports.iter().filter_map(of).collect();
-    let mut controls = Vec::new();
+    let mut before = Vec::new();
     for (station, _) in &ports {
-        controls.push(DlControl::decode(&bus.fprd_array(*station, map::DL_CONTROL).await?));
+        before.push((*station, lasting(bus, *station).await?));
     }
-    let close = ports.iter().zip(&controls).map(|((station, port), control)| (*station, closed(*control, *port)));
+    // A scan or a stop that begins meanwhile restores them.
+    segment.observe(Observation::PortsAltered(&before));
+    let close = ports.iter().zip(&before).map(|((station, port), (_, control))| (*station, closed(*control, *port)));
     let result = match write(bus, close.collect()).await {
         Ok(()) => answering(bus, stations).await,
         Err(error) => Err(error),
     };
-    let before = |control: &DlControl| DlControl { temporary: false, ..*control };
-    let open = ports.iter().zip(&controls).map(|((station, _), control)| (*station, before(control)));
-    if result.is_err() || write(bus, open.collect()).await.is_err() {
+    if result.is_err() || write(bus, before).await.is_err() {
         // Frames were lost, or one of the two SubDevices does not answer: the settings expire.
         bus.sleep(TEMPORARY).await;
     }
+    segment.observe(Observation::PortsAltered(&[]));
     Ok(result.ok())
 }
 

@@ -17,6 +17,7 @@ use ringcat_wire::register::{DlStatus, map};
 use super::learn::{Reached, first_behind_break, with_closed};
 use crate::junction::ClosingEvidence;
 use crate::order::InOrder;
+use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::Bus;
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 
@@ -29,7 +30,7 @@ const PAUSE: Duration = Duration::from_millis(2);
 /// The number of a closing cable that is not where it was declared, and the evidence. Every SubDevice has the station
 /// address of its position.
 pub(crate) async fn refute(
-    bus: &Bus,
+    on @ (bus, _): (&Bus, &SharedSegment),
     scanned: Reached<'_>,
     main_count: usize,
     closings: &[Closing],
@@ -37,7 +38,7 @@ pub(crate) async fn refute(
     let mut last = None;
     for _ in 0..TRIES {
         let nodes = present_ports(bus, scanned).await?;
-        last = Some(attempt(bus, Reached { nodes: &nodes, ..scanned }, main_count, closings).await?);
+        last = Some(attempt(on, Reached { nodes: &nodes, ..scanned }, main_count, closings).await?);
         if present_ports(bus, scanned).await? != nodes {
             return None;
         }
@@ -46,7 +47,7 @@ pub(crate) async fn refute(
 }
 
 async fn attempt(
-    bus: &Bus,
+    on: (&Bus, &SharedSegment),
     Reached { nodes, stations }: Reached<'_>,
     main_count: usize,
     closings: &[Closing],
@@ -66,7 +67,7 @@ async fn attempt(
         let broken = if linked.len() == 2 { first_behind_break(nodes, &topology, closing) } else { None };
         let silent = |node: usize| broken.is_some_and(|first| topology.is_behind(node, first));
         let ports = if broken.is_some() { &linked[..1] } else { &linked[..] };
-        let shown = match with_closed(bus, ports, stations).await.ok()? {
+        let shown = match with_closed(on, ports, stations).await.ok()? {
             Some(answers) => {
                 let odd = answers.iter().enumerate().find(|(node, answers)| **answers == silent(*node));
                 match odd.map(|(node, answers)| (node, *answers)) {

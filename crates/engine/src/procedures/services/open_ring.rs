@@ -2,29 +2,34 @@
 
 use alloc::vec::Vec;
 use core::future::Future;
+use core::time::Duration;
 
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::{DlStatus, map};
 
 use crate::link::LinkSet;
 use crate::procedures::idle::{are_ports_as_before, without_watch};
-use crate::procedures::loops::{controls, until_ring_is_closed, while_closed};
+use crate::procedures::loops::{controls, while_closed};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::ring::RingState;
-use crate::segment::{IdleObservation, Segment};
+use crate::segment::{IdleObservation, Observation, Segment};
 use crate::supervisor::Bus;
+
+/// Maximum wait until an opened ring of two links shows to be closed again: broadcasts pause meanwhile, and a ring that
+/// broke has to be noticed soon.
+const CLOSING: Duration = Duration::from_millis(50);
 
 /// Rings that are opened.
 #[derive(Debug)]
 pub(super) struct Rings {
     /// The ports at their ends.
     pub ports: Vec<(StationAddress, u8)>,
-    /// The ports of all SubDevices before.
+    /// The ports of all SubDevices, by position, as the last scan has found them.
     pub status: Vec<(StationAddress, DlStatus)>,
 }
 
 /// Closes the ports at the ends of rings, carries out `open`, opens the ports again and carries out `whole`, also if the
-/// caller no longer waits; `None` if that cannot be done now.
+/// caller no longer waits. `None` if that cannot be done now, or the segment is not, or no longer, that of the last scan.
 pub(super) async fn while_open<T: 'static, U: 'static>(
     bus: &Bus,
     segment: &SharedSegment,
@@ -34,25 +39,39 @@ pub(super) async fn while_open<T: 'static, U: 'static>(
 ) -> Option<(T, U)> {
     let (own_bus, own_segment) = (bus.clone(), segment.clone());
     let work = async move {
-        let opened = close_ports(&own_bus, &own_segment, &rings.ports, open).await?;
-        let closed = whole.await;
-        let is_as_before = clear_events(&own_bus, &own_segment, &rings.status).await;
-        if !is_as_before {
-            own_segment.observe_idle(IdleObservation::RescanAsked);
+        let (bus, segment) = (own_bus, own_segment);
+        // Idle operation may have found another segment before its work had ended.
+        let stations = |segment: &Segment| segment.found().map(|found| found.stations());
+        let are_same =
+            stations(&segment.view()).is_some_and(|now| now.iter().eq(rings.status.iter().map(|(at, _)| at)));
+        if !are_same || !is_as_scanned(&bus, &segment, &rings.status).await {
+            return None;
         }
-        Some((opened, closed))
+        let opened = close_ports(&bus, &segment, &rings.ports, open).await;
+        let closed = whole.await;
+        // Otherwise idle operation would scan again because of the ports, and examine the rings.
+        let is_cleared = bus.brd(map::DL_STATUS, DlStatus::LEN).await.is_ok();
+        let is_as_before = is_as_scanned(&bus, &segment, &rings.status).await;
+        Some((opened?, closed)).filter(|_| is_cleared && is_as_before)
     };
     without_watch(bus, segment, work).await.flatten()
 }
 
-/// Clears the ECAT events of the ports: idle operation would scan again, and examine the rings. False if ports have
-/// changed besides.
-async fn clear_events(bus: &Bus, segment: &SharedSegment, before: &[(StationAddress, DlStatus)]) -> bool {
-    // An application finds the events itself.
+/// Whether the ports are as the last scan has found them. Reading them clears their ECAT events, so a difference has
+/// idle operation scan again; an application that has begun meanwhile looks at them itself.
+async fn is_as_scanned(bus: &Bus, segment: &SharedSegment, scanned: &[(StationAddress, DlStatus)]) -> bool {
+    let is_same = are_ports_as_before(bus, scanned).await.unwrap_or(false);
+    follow_ports(segment, is_same);
+    is_same
+}
+
+/// The ECAT events of the ports were cleared. `is_same`: the ports are as the last scan has found them.
+pub(super) fn follow_ports(segment: &SharedSegment, is_same: bool) {
     if segment.view().is_active() {
-        return true;
+        segment.observe(Observation::RoundWanted);
+    } else if !is_same {
+        segment.observe_idle(IdleObservation::RescanAsked);
     }
-    bus.brd(map::DL_STATUS, DlStatus::LEN).await.is_ok() && are_ports_as_before(bus, before).await.unwrap_or(false)
 }
 
 async fn close_ports<T>(
@@ -68,9 +87,5 @@ async fn close_ports<T>(
         return None;
     }
     let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
-    let result = while_closed(bus, segment, (&before, ports), work).await.ok();
-    if is_closed {
-        until_ring_is_closed(bus).await;
-    }
-    result
+    while_closed(bus, segment, (&before, ports), is_closed.then_some(CLOSING), work).await.ok()
 }

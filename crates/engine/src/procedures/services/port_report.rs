@@ -18,7 +18,7 @@ use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DcReceiveTimes, DlStatus, ErrorCounters, PortKind, map};
 
 use super::ServiceError;
-use super::open_ring::{Rings, while_open};
+use super::open_ring::{Rings, follow_ports, while_open};
 use crate::clocks::{Cables, Latched, Measurements, Wiring};
 use crate::declared::{Address, SubDeviceId};
 use crate::link::{Link, LinkSet};
@@ -112,6 +112,8 @@ struct Known {
     kinds: Vec<[PortKind; 4]>,
     has_clock: Vec<bool>,
     names: Vec<Address>,
+    /// The ports as the last scan has found them; empty while active.
+    scanned: Vec<(StationAddress, DlStatus)>,
     /// While active: delays by station, if they are measured.
     delays: Option<BTreeMap<StationAddress, i64>>,
 }
@@ -129,6 +131,8 @@ impl Known {
             let here = all.filter(|it| it.key.station == *station).find_map(|it| it.knowledge.info());
             here.map(|info| (info.controller.ports, info.controller.features.dc)).unwrap_or_default()
         };
+        let found = segment.found().filter(|_| !is_active);
+        let scanned = found.map(|found| found.subdevices.iter().map(|info| (info.station, info.dl_status)).collect());
         let (kinds, has_clock) = stations.iter().map(info).unzip();
         let name = |(position, station): (u16, &StationAddress)| {
             let member = segment.subdevices().member_of(*station).filter(|_| is_active);
@@ -137,7 +141,7 @@ impl Known {
         let names = (0..).zip(&stations).map(name).collect();
         let measured = || segment.clocks().status().into_iter().filter(|it| it.hidden.is_none());
         let delays = is_active.then(|| measured().map(|clock| (clock.station, clock.delay_ns)).collect());
-        Some(Known { stations, topology, kinds, has_clock, names, delays })
+        Some(Known { stations, topology, kinds, has_clock, names, scanned: scanned.unwrap_or_default(), delays })
     }
 
     /// Delays from the first clock. `cables`: times of cables; those that these frames show are added.
@@ -161,6 +165,7 @@ impl Known {
 /// Registers of one SubDevice.
 struct Readings {
     ports: [PortRegisters; 4],
+    dl_status: DlStatus,
     unit_errors: u8,
 }
 
@@ -180,9 +185,13 @@ pub(crate) async fn read(bus: &Bus, segment: &SharedSegment) -> Result<Vec<SubDe
     let each: Vec<(StationAddress, bool)> =
         known.stations.iter().copied().zip(known.has_clock.iter().copied()).collect();
     let readings = bus.gather(each, |bus, (station, clock)| async move { one(&bus, station, clock).await.ok() }).await;
+    // Reading the ports has cleared their ECAT events, which show a change.
+    let ports_of = |readings: &Option<Readings>| readings.as_ref().map(|readings| readings.dl_status.ports);
+    let is_as_scanned = known.scanned.iter().map(|(_, status)| Some(status.ports)).eq(readings.iter().map(ports_of));
+    follow_ports(segment, is_as_scanned);
     let delays = match &known.delays {
         Some(delays) => known.stations.iter().map(|station| delays.get(station).copied()).collect(),
-        None => samples.delays(&known).unwrap_or_else(|| vec![None; known.stations.len()]),
+        None => samples.delays(&known).filter(|_| is_as_scanned).unwrap_or_else(|| vec![None; known.stations.len()]),
     };
     Ok(reports(&known, &readings, &delays, bus.links()))
 }
@@ -218,9 +227,7 @@ impl Samples {
         if ports.is_empty() {
             return Samples { wiring, whole: samples(bus, known, None).await, ..Samples::default() };
         }
-        let status: Option<Vec<DlStatus>> = status.into_iter().collect();
-        let Some(status) = status else { return Samples::default() };
-        let rings = Rings { ports, status: known.stations.iter().copied().zip(status).collect() };
+        let rings = Rings { ports, status: known.scanned.clone() };
         let no_return = is_closed.then_some(Link::Redundant);
         let work = |no_return| {
             let (own_bus, own) = (bus.clone(), known.clone());
@@ -294,7 +301,7 @@ async fn one(bus: &Bus, station: StationAddress, clock: bool) -> Result<Readings
         forwarded_errors: counters.forwarded[port],
         lost_links: counters.lost_link[port],
     };
-    Ok(Readings { ports: [0, 1, 2, 3].map(port), unit_errors: counters.epu })
+    Ok(Readings { ports: [0, 1, 2, 3].map(port), dl_status, unit_errors: counters.epu })
 }
 
 /// The first bytes of data; zeros where it is shorter.

@@ -102,7 +102,7 @@ fn an_exported_eni_reaches_op_on_the_segment_of_the_eni_it_was_made_of() {
 fn differences(file: &EniFile, bus: &str) -> Vec<(DifferenceKind, bool)> {
     let links = SimulatedSegment::from_toml(bus).expect("the segment is valid");
     let scan = MainDevice::request(links, &Options::default()).scan().expect("the scan succeeds");
-    let found = FoundNetwork { subdevices: &scan.subdevices, topology: &scan.topology, firmware: &[] };
+    let found = FoundNetwork::new(&scan.subdevices, &scan.topology);
     let all = file.configuration.differences(found, &file.stated());
     all.into_iter().map(|it| (it.kind, it.prevents_op)).collect()
 }

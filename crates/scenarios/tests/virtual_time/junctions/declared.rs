@@ -10,7 +10,7 @@ use ringcat_sim::cable::{CableId, Endpoint};
 use ringcat_sim::frame::Port::{A, B, C, D};
 use ringcat_sim::network::Network;
 use scenarios::dice::Dice;
-use scenarios::segments::{MAIN, REDUNDANT, RING_OF_THREE, TWO_RINGS, at, wired};
+use scenarios::segments::{MAIN, REDUNDANT, RING_OF_THREE, TWO_RINGS, at, descriptions, wired, wired_with};
 use scenarios::tap::Tap;
 use scenarios::world::{CYCLE, World};
 
@@ -168,5 +168,59 @@ fn connections_are_checked_at_the_addresses_that_subdevices_have() {
                 matches!(got, Err(Error::Activate(ActivateError::Junction(JunctionError::NotThere { .. }))));
             assert_eq!((got.is_ok(), is_refused), (is_right, !is_right), "{broken:?}, tail {tail}: {got:?}");
         }
+    }
+}
+
+/// Five in a row on the first port of a junction: no ring.
+const NO_RING: [(Endpoint, Endpoint); 5] =
+    [(MAIN, at(0, A)), (at(0, D), at(1, A)), (at(1, B), at(2, A)), (at(0, B), at(3, A)), (at(3, B), at(4, A))];
+
+/// A wrong connection over [`NO_RING`], loaded while the last SubDevice, of a slow EEPROM, is read after it was added.
+fn loaded_while_reading(busy: Duration) -> MainDevice<Tap> {
+    let mut described = descriptions(&["junction", "digital-output-8", "servo", "digital-input-8", "digital-input-8"]);
+    described[4].sii_busy = busy;
+    let mut network = wired_with(described, &NO_RING);
+    network.cut(CableId(4));
+    network.advance_by(Duration::from_millis(1));
+    let options = Options::default().with_idle_operation(true).with_junctions(JunctionMode::Strict);
+    let mut main_device = MainDevice::request(Tap::new(network), &options);
+    main_device.attend(Duration::from_secs(1));
+    main_device.load(automatic(&main_device.subdevices(), CYCLE)).expect("it fits");
+    main_device.add_junction_connection(connection((0, 2, 1))).expect("ports that exist");
+    main_device.links_mut().network_mut().heal(CableId(4));
+    main_device.attend(Duration::from_millis(100));
+    main_device
+}
+
+// covers: JR-05, JR-06, junctions
+#[test]
+fn a_wrong_connection_is_not_accepted_while_a_change_is_read() {
+    for (busy, is_tested) in [(Duration::from_millis(1), true), (Duration::from_millis(99), false)] {
+        let checked = loaded_while_reading(busy).check_connections();
+        let is_refused = match checked {
+            Err(JunctionError::NotThere { .. }) => is_tested,
+            Err(JunctionError::NotTested) => !is_tested,
+            _ => false,
+        };
+        assert!(is_refused, "{busy:?}: {checked:?}");
+    }
+}
+
+/// A scan opens all ports: then the wrong connection would look right.
+// covers: JR-05, JR-06, junctions
+#[test]
+fn a_wrong_connection_is_not_accepted_while_a_scan_begins() {
+    for after in 0..60 {
+        let mut main_device = loaded_while_reading(Duration::ZERO);
+        main_device.attend(Duration::from_secs(1));
+        let mut check = main_device.engine_mut().start_connection_check();
+        main_device.attend(Duration::from_micros(50 * after));
+        main_device.engine_mut().restart_scan().expect("it is permitted");
+        main_device.attend(Duration::from_secs(12));
+        let checked = check.take();
+        assert!(
+            matches!(checked, Some(Err(JunctionError::NotThere { .. } | JunctionError::NotTested))),
+            "{after}: {checked:?}"
+        );
     }
 }
