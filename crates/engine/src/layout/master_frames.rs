@@ -124,8 +124,8 @@ impl PlannedMasterFrames {
         Ok(planned)
     }
 
-    /// Whether a cycle holds its frames: those of all domains, master frames, and one acyclic frame of at most `acyclic`
-    /// bytes. Further acyclic frames take what is left of a cycle.
+    /// Whether a cycle holds its frames: those of all domains, master frames, and one acyclic frame of at most
+    /// `acyclic` bytes. Further acyclic frames take what is left of a cycle.
     ///
     /// # Errors
     /// [`LayoutError::CycleTooShort`].

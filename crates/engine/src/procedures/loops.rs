@@ -92,7 +92,8 @@ pub(super) fn write_of((station, control): (StationAddress, DlControl)) -> (Comm
 pub(super) async fn while_closed<T>(
     bus: &Bus,
     segment: &SharedSegment,
-    (before, ports): (&[(StationAddress, DlControl)], &[(StationAddress, u8)]),
+    before: &[(StationAddress, DlControl)],
+    ports: &[(StationAddress, u8)],
     closing: Option<Duration>,
     work: impl Future<Output = T>,
 ) -> Result<T, BusError> {

@@ -18,6 +18,7 @@ mod same_identity;
 mod taking_over;
 mod threads;
 mod watchdogs;
+mod wire_time;
 
 use std::time::Duration;
 

@@ -169,7 +169,7 @@ async fn measure_open(
     // The port at the end of a ring of two links is closed: frames on the redundant link do not return.
     open.no_return = survey.is_closed.then_some(Link::Redundant);
     let closing = survey.is_closed.then_some(CLOSING_LIMIT);
-    let result = while_closed(bus, segment, (&before, &ports), closing, take(bus, segment, &open)).await;
+    let result = while_closed(bus, segment, &before, &ports, closing, take(bus, segment, &open)).await;
     drop(turn);
     result.map_err(|error| error.to_string())?.map(drop)
 }

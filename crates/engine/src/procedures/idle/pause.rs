@@ -13,8 +13,8 @@ use crate::supervisor::Bus;
 /// Maximum wait for other procedures that need the ports, and for one of idle operation that works on the segment.
 const LIMIT: Duration = Duration::from_secs(5);
 
-/// Carries out work that closes ports for a moment, to its end also if the caller no longer waits. Broadcasts would show
-/// another segment meanwhile. `None` if it cannot be done now, or a scan has begun meanwhile.
+/// Carries out work that closes ports for a moment, to its end also if the caller no longer waits. Broadcasts would
+/// show another segment meanwhile. `None` if it cannot be done now, or a scan has begun meanwhile.
 pub(crate) async fn without_watch<T: 'static>(
     bus: &Bus,
     segment: &SharedSegment,

@@ -28,8 +28,8 @@ pub(super) struct Rings {
     pub status: Vec<(StationAddress, DlStatus)>,
 }
 
-/// Closes the ports at the ends of rings, carries out `open`, opens the ports again and carries out `whole`, also if the
-/// caller no longer waits. `None` if that cannot be done now, or the segment is not, or no longer, that of the last scan.
+/// Closes the ports at the ends of rings, carries out `open`, opens the ports again and carries out `whole`, also if
+/// the caller no longer waits. `None` if that cannot be done now, or the segment is not, or no longer, that of the last scan.
 pub(super) async fn while_open<T: 'static, U: 'static>(
     bus: &Bus,
     segment: &SharedSegment,
@@ -87,5 +87,5 @@ async fn close_ports<T>(
         return None;
     }
     let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
-    while_closed(bus, segment, (&before, ports), is_closed.then_some(CLOSING), work).await.ok()
+    while_closed(bus, segment, &before, ports, is_closed.then_some(CLOSING), work).await.ok()
 }
