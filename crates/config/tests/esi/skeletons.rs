@@ -1,6 +1,7 @@
 //! Descriptions made of images: each field that is lost on the way has a notice.
 
 use std::fs;
+use std::time::{Duration, Instant};
 
 use ringcat_config::esi;
 use ringcat_config::esi::sii::{self, Comparison, SiiOptions, SiiProfile};
@@ -97,6 +98,22 @@ fn categories_of_vendors_are_kept_whatever_their_number() {
         assert_eq!(made.notices, [""; 0], "{code}");
         assert!(compared.differences.iter().all(|it| it.field == "categories"), "{code}: {:?}", compared.differences);
     }
+}
+
+// covers: esi-use, ES-72
+#[test]
+fn a_description_of_30000_categories_is_made_in_linear_time() {
+    const COUNT: u16 = 30_000;
+    let image = terminal(|image| {
+        image.truncate(Sii::parse(image).unwrap().used() - 2);
+        (0..COUNT).for_each(|number| image.extend([(number + 1_000).to_le_bytes(), [1, 0], [7, 7]].concat()));
+        image.extend([0xff; 2]);
+    });
+    let begin = Instant::now();
+    let made = sii::skeleton(&image).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(made.text.matches("<Category>").count(), COUNT.into(), "{:?}", made.notices.first());
+    // A search among all categories for each took 30 s.
+    assert!(begin.elapsed() < Duration::from_secs(5), "{:?}", begin.elapsed());
 }
 
 // covers: ES-105, esi-use
