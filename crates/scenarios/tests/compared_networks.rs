@@ -173,7 +173,8 @@ fn differences_are_marked_exactly_if_a_changed_bus_does_not_reach_op() {
         assert!(eni.is_some() || has_aliases || file.clocks.is_some(), "seed {seed}");
         if eni.is_none() || dice.one_in(2) {
             eni = None;
-            // Of two alike the engine may take the other one as the absent one: its modules differ then.
+            // Of two equal SubDevices the engine may take the other one as absent: then the modules of the remaining
+            // one differ.
             for (it, unit) in file.subdevice.iter_mut().zip(&units) {
                 it.optional = !unit.is_modular() && dice.one_in(4);
             }

@@ -118,11 +118,11 @@ fn a_description_of_30000_categories_is_made_in_linear_time() {
 
 // covers: ES-105, esi-use
 #[test]
-fn what_images_of_vendors_lose_in_a_description_is_a_notice_and_listed() {
+fn fields_that_images_of_vendors_lose_in_a_description_are_listed_notices() {
     let mut found = String::new();
     for path in files("sii").iter().filter(|path| path.extension().is_some_and(|ending| ending == "bin")) {
         let image = fs::read(path).unwrap();
-        // One is damaged.
+        // One image is damaged.
         if Sii::parse(&image).is_err() {
             continue;
         }
@@ -137,7 +137,7 @@ fn what_images_of_vendors_lose_in_a_description_is_a_notice_and_listed() {
         let is_lost = |it: &&sii::FieldDifference| {
             let field = it.field.as_str();
             let counts = !it.is_individual && !it.expected.is_empty() && !OF_A_TOOL.contains(&field);
-            // Another tool may write a field that the most alike one leaves out.
+            // Another tool may write a field that the most similar tool leaves out.
             counts && !has_notice(field) && !is_written(&made, &image, field)
         };
         let silent: Vec<_> = compared.differences.iter().filter(is_lost).collect();

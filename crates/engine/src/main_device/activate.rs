@@ -122,7 +122,7 @@ impl MainDevice {
         Ok((specs, layout))
     }
 
-    /// Reports that a declared reference clock is none.
+    /// Reports that the SubDevice declared as the reference clock has no clock.
     fn report_reference(&self, replaced: Option<(SubDeviceId, Option<Position>)>) {
         let Some((subdevice, instead)) = replaced else { return };
         let oddity = Oddity::Reference { instead };

@@ -1,4 +1,4 @@
-//! Frames of a cycle with a standby, against the time that they have.
+//! The time that the frames of a cycle take on the wire with a standby, compared with the period.
 
 use std::sync::mpsc;
 use std::time::Duration;
