@@ -3,7 +3,8 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use ringcat::{Instant, Link, Links};
-use ringcat_wire::frame::MacAddress;
+use ringcat_wire::datagram::OVERHEAD;
+use ringcat_wire::frame::{ETHERCAT_HEADER_LEN, ETHERNET_HEADER_LEN, MacAddress};
 
 /// A frame that passed.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -34,6 +35,26 @@ impl Frames {
     pub fn take(&self) -> Vec<Passed> {
         std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
+
+    /// Command and register address (ADO) of each datagram that the engine has sent since the last call. Frames are
+    /// dropped.
+    pub fn sent(&self) -> Vec<(u8, u16)> {
+        self.take().iter().filter(|passed| passed.is_sent).flat_map(|passed| datagrams(&passed.frame)).collect()
+    }
+}
+
+/// Command and register address of each datagram of a frame.
+fn datagrams(frame: &[u8]) -> Vec<(u8, u16)> {
+    let (mut found, mut at) = (Vec::new(), ETHERNET_HEADER_LEN + ETHERCAT_HEADER_LEN);
+    while let Some(header) = frame.get(at..at + OVERHEAD - 2) {
+        found.push((header[0], u16::from_le_bytes([header[4], header[5]])));
+        let length = u16::from_le_bytes([header[6], header[7]]);
+        at += OVERHEAD + usize::from(length & 0x07FF);
+        if length & 0x8000 == 0 {
+            break;
+        }
+    }
+    found
 }
 
 impl<L: Links> Witness<L> {

@@ -4,8 +4,8 @@
 use std::time::Duration;
 
 use ringcat::{
-    Application, ClockConfig, Declaration, DomainId, Error, Event, LastOutputs, MainDevice, Options, Position, Retries,
-    Scan, Services, StopError, SubDeviceConfig, SubDeviceId, SubDeviceState, automatic,
+    Application, ClockConfig, Declaration, DomainId, Error, Event, LastOutputs, Links, MainDevice, Options, Position,
+    Retries, Scan, Services, StopError, SubDeviceConfig, SubDeviceId, SubDeviceState, automatic,
 };
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;
@@ -14,12 +14,17 @@ use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
 use ringcat_wire::register::{Fmmu, map};
 use scenarios::segments::{SIXTEEN, descriptions, line, ring};
 use scenarios::tap::Tap;
+use scenarios::witness::Witness;
 use scenarios::world::CYCLE;
 
 const LIMIT: Duration = Duration::from_secs(1);
+/// Beside the state changes with clocks, which are known; that they lock is not awaited.
+const WITH_CLOCKS: Duration = Duration::from_millis(15);
 /// Two with a mailbox, two with device emulation, two with neither.
 const MIXED: [&str; 6] =
     ["servo", "digital-output-8", "emulated-output-8", "servo", "emulated-input-8", "digital-input-8"];
+/// SII_CONTROL to SII_DATA: with SII_CONFIGURATION in front of them the EEPROM only changes its owner.
+const SII_INTERFACE: std::ops::Range<u16> = 0x0502..0x0510;
 const PREOP: AlStatus = AlStatus::new(AlState::PreOp);
 
 fn networks() -> [Network; 2] {
@@ -37,11 +42,11 @@ fn activate(main_device: MainDevice<Tap>, declaration: Declaration) -> Applicati
     main_device.activate(declaration).map_err(Error::from).expect("it fits")
 }
 
-fn cycles(application: &mut Application<Tap>, count: usize) {
+fn cycles<L: Links>(application: &mut Application<L>, count: usize) {
     (0..count).for_each(|_| application.cycle(|_| ()));
 }
 
-fn settle(application: &mut Application<Tap>) {
+fn settle<L: Links>(application: &mut Application<L>) {
     let end = application.now() + Duration::from_secs(2);
     while !application.all_settled() {
         assert!(application.now() < end, "{:?}", application.states());
@@ -128,6 +133,8 @@ fn another_declaration_is_active_at_once_after_deactivation() {
     }
 }
 
+/// On a line and in a ring, with idle operation and without, without and with clocks. No word of an SII is read: its
+/// control, address and data registers are not touched.
 // covers: stop
 #[test]
 fn activation_after_deactivation_of_100_takes_the_state_changes_and_10_ms() {
@@ -135,22 +142,35 @@ fn activation_after_deactivation_of_100_takes_the_state_changes_and_10_ms() {
     let described = descriptions(&kinds);
     let times = described.iter().map(|it| it.transitions);
     let changes = times.map(|it| it.to_init + it.to_preop + it.to_safeop + it.to_op).max().expect("there are some");
-    let (main_device, scan) = scanned(ring(described, NetworkOptions::default()), &Options::default());
-    let declaration = automatic(&scan.subdevices, CYCLE);
-    let mut application = activate(main_device, declaration.clone());
-    settle(&mut application);
-    let begun = application.now();
-    let mut ended = application.deactivate(LastOutputs::Zero, LIMIT).expect("all follow");
-    let deactivation = ended.now().since(begun);
-    let network = ended.links_mut().network_mut();
-    (0..kinds.len()).for_each(|at| network.device_mut(DeviceIndex(at)).controller.sii_image_mut().fill(0));
-    let begun = ended.now();
-    let mut application = activate(ended, declaration);
-    settle(&mut application);
-    let activation = application.now().since(begun);
-    println!("100 SubDevices: deactivation {deactivation:?}, activation {activation:?}, state changes {changes:?}");
-    assert!(activation <= changes + Duration::from_millis(10), "{activation:?}");
-    assert!(application.links().network().devices().all(|device| device.al_status() == AlStatus::new(AlState::Op)));
+    for (is_ring, with_idle, clocks) in
+        [(true, false, false), (true, true, false), (false, true, false), (true, true, true)]
+    {
+        let build = if is_ring { ring } else { line };
+        let network = build(described.clone(), NetworkOptions::default());
+        let (links, frames) = Witness::new(Tap::new(network));
+        let mut main_device = MainDevice::request(links, &Options::default().with_idle_operation(with_idle));
+        let scan = main_device.scan().expect("it can be scanned");
+        let declaration = automatic(&scan.subdevices, CYCLE).with_clocks(clocks.then(ClockConfig::default));
+        let mut application = main_device.activate(declaration.clone()).map_err(Error::from).expect("it fits");
+        settle(&mut application);
+        frames.take();
+        let begun = application.now();
+        let ended = application.deactivate(LastOutputs::Zero, LIMIT).expect("all follow");
+        let deactivation = ended.now().since(begun);
+        let begun = ended.now();
+        let mut application = ended.activate(declaration).map_err(Error::from).expect("it fits");
+        settle(&mut application);
+        let activation = application.now().since(begun);
+        let what = format!("100 SubDevices, ring {is_ring}, idle operation {with_idle}, clocks {clocks}");
+        println!("{what}: deactivation {deactivation:?}, activation {activation:?}, state changes {changes:?}");
+        let sent = frames.sent();
+        let touched = sent.iter().filter(|(_, register)| SII_INTERFACE.contains(register)).count();
+        assert_eq!((touched, sent.len() > 1_000), (0, true), "{what}");
+        let limit = changes + if clocks { WITH_CLOCKS } else { Duration::from_millis(10) };
+        assert!(activation <= limit, "{what}: {activation:?}");
+        let all = application.links().links().network().devices();
+        assert!(all.into_iter().all(|device| device.al_status() == AlStatus::new(AlState::Op)), "{what}");
+    }
 }
 
 // covers: stop

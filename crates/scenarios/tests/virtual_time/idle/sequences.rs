@@ -8,16 +8,20 @@ use std::ops::Range;
 use std::time::Duration;
 
 use ringcat::{
-    Application, ClockConfig, Declaration, Error, LastOutputs, MainDevice, Options, Position, Services, SubDeviceConfig,
+    Application, ClockConfig, Declaration, Error, JunctionMode, LastOutputs, MainDevice, Options, PortReport, Position,
+    Services, SubDeviceConfig,
 };
-use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::cable::{CableId, DeviceIndex, Endpoint};
+use ringcat_sim::device::Device;
 use ringcat_sim::fault::Fault;
+use ringcat_sim::frame::Port;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::al::{AlControl, AlState, AlStatus};
 use ringcat_wire::register::map;
+use scenarios::clocks::wired;
 use scenarios::dice::Dice;
 use scenarios::seeds;
-use scenarios::segments::{descriptions, line, ring};
+use scenarios::segments::{MAIN, REDUNDANT, at, descriptions, line, ring};
 use scenarios::tap::Tap;
 use scenarios::world::CYCLE;
 
@@ -116,10 +120,31 @@ fn declare(dice: &mut Dice, main_device: &MainDevice<Tap>) -> Declaration {
     declaration.with_clocks(dice.one_in(3).then(ClockConfig::default))
 }
 
+/// A call that examines rings or closes ports, or a scan that begins meanwhile.
+fn examine(dice: &mut Dice, main_device: &mut MainDevice<Tap>) {
+    match dice.below(4) {
+        0 => _ = main_device.port_report(),
+        // The caller gives up.
+        1 => {
+            let report = main_device.engine_mut().start_port_report();
+            main_device.attend(Duration::from_micros(dice.below(12_000)));
+            drop(report);
+        }
+        2 => {
+            let report = main_device.engine_mut().start_port_report();
+            main_device.attend(Duration::from_micros(dice.below(12_000)));
+            let _ = main_device.engine_mut().restart_scan();
+            drop(report);
+        }
+        _ => _ = main_device.rescan(LIMIT),
+    }
+}
+
 /// The next call of the application.
 fn step(dice: &mut Dice, side: Side, options: &Options) -> Side {
+    let calls = if options.junctions == JunctionMode::Automatic { 9 } else { 6 };
     match side {
-        Side::Idle(mut main_device) => match dice.below(6) {
+        Side::Idle(mut main_device) => match dice.below(calls) {
             0..=2 => {
                 let declaration = declare(dice, &main_device);
                 match main_device.activate(declaration) {
@@ -137,6 +162,10 @@ fn step(dice: &mut Dice, side: Side, options: &Options) -> Side {
                 let at = dice.below(KINDS.len() as u64) as u16;
                 let _ = main_device.subdevice(Position(at)).within(LIMIT).sdo_read::<u32>(0x1018, 1);
                 Services::retry(&mut *main_device, None);
+                Side::Idle(main_device)
+            }
+            6..=8 => {
+                examine(dice, &mut main_device);
                 Side::Idle(main_device)
             }
             // Released, and requested again.
@@ -159,8 +188,8 @@ fn step(dice: &mut Dice, side: Side, options: &Options) -> Side {
     }
 }
 
-fn run(seed: u64) -> Result<(), String> {
-    let mut dice = Dice::new(seed);
+/// A line, or a ring of two links.
+fn row(dice: &mut Dice) -> (Vec<&'static str>, Network) {
     let count = 2 + dice.below(KINDS.len() as u64 - 1) as usize;
     let kinds: Vec<&str> = (0..count).map(|_| *dice.pick(&KINDS)).collect();
     let described = descriptions(&kinds);
@@ -169,15 +198,64 @@ fn run(seed: u64) -> Result<(), String> {
     } else {
         line(described, NetworkOptions::default())
     };
-    let options = Options::default().with_idle_operation(true);
+    (kinds, network)
+}
+
+/// One or two rings behind junctions, on a line or in a ring of two links, with SubDevices before and behind each.
+fn rings(dice: &mut Dice) -> (Vec<&'static str>, Network) {
+    let (mut cables, mut count) = (Vec::new(), 0);
+    let mut hang = |from: Endpoint, cables: &mut Vec<(Endpoint, Endpoint)>| {
+        cables.push((from, at(count, Port::A)));
+        count += 1;
+        count - 1
+    };
+    let mut end = MAIN;
+    for _ in 0..1 + dice.below(2) {
+        for _ in 0..dice.below(2) {
+            end = at(hang(end, &mut cables), Port::B);
+        }
+        let junction = hang(end, &mut cables);
+        let mut member = at(junction, Port::D);
+        for _ in 0..1 + dice.below(3) {
+            member = at(hang(member, &mut cables), Port::B);
+        }
+        cables.push((member, at(junction, Port::B)));
+        end = at(junction, Port::C);
+    }
+    for _ in 0..dice.below(2) {
+        end = at(hang(end, &mut cables), Port::B);
+    }
+    if dice.one_in(2) {
+        cables.push((end, REDUNDANT));
+    }
+    let kinds: Vec<&str> = (0..count).map(|_| *dice.pick(&KINDS)).collect();
+    let network = wired(descriptions(&kinds), &cables);
+    (kinds, network)
+}
+
+fn run(seed: u64) -> Result<(), String> {
+    let mut dice = Dice::new(seed);
+    let (kinds, network) = row(&mut dice);
+    run_on(&mut dice, &kinds, network, JunctionMode::Disabled)
+}
+
+fn run_of_rings(seed: u64) -> Result<(), String> {
+    let mut dice = Dice::new(seed);
+    let (kinds, network) = rings(&mut dice);
+    run_on(&mut dice, &kinds, network, JunctionMode::Automatic)
+}
+
+fn run_on(dice: &mut Dice, kinds: &[&str], network: Network, junctions: JunctionMode) -> Result<(), String> {
+    let count = kinds.len();
+    let options = Options::default().with_idle_operation(true).with_junctions(junctions);
     let mut side = Side::Idle(Box::new(MainDevice::request(Tap::new(network), &options)));
     let mut faults = Faults { cut: None, off: None };
     for _ in 0..8 + dice.below(12) {
         side.work(Duration::from_micros(dice.below(120_000)));
         if dice.one_in(2) {
-            faults.change(&mut dice, &mut side);
+            faults.change(dice, &mut side);
         }
-        side = step(&mut dice, side, &options);
+        side = step(dice, side, &options);
     }
     faults.end(side.network());
     if let Side::Active(mut application) = side {
@@ -199,10 +277,10 @@ fn run(seed: u64) -> Result<(), String> {
         let Side::Active(application) = side else { return Ok(()) };
         let ended = application.deactivate(LastOutputs::Zero, Duration::from_secs(2)).map_err(Error::from);
         side = Side::Idle(Box::new(ended.map_err(|error| format!("{kinds:?}: {error}"))?));
-        return in_preop(&mut side, count, &kinds);
+        return in_preop(&mut side, count, kinds);
     }
     side.work(RECOVERY);
-    in_preop(&mut side, count, &kinds)
+    in_preop(&mut side, count, kinds)
 }
 
 /// All are in PREOP, known, and answer.
@@ -225,10 +303,26 @@ fn in_preop(side: &mut Side, count: usize, kinds: &[&str]) -> Result<(), String>
     if under_way.procedures > 6 + 2 * count {
         return Err(format!("{kinds:?}: procedures are left: {under_way:?}"));
     }
+    ports_are_known(main_device).map_err(|error| format!("{kinds:?}: {error}"))
+}
+
+/// No port is closed on purpose, and the other end of each cable is known.
+fn ports_are_known(main_device: &mut MainDevice<Tap>) -> Result<(), String> {
+    let loops = |device: &Device| device.controller.register(map::DL_CONTROL, 2)[1];
+    let closed: Vec<u8> = main_device.links_mut().network().devices().map(loops).collect();
+    if closed.iter().any(|loops| *loops != 0) {
+        return Err(format!("ports are closed: {closed:?}"));
+    }
+    for it in main_device.port_report().map_err(|error| error.to_string())? {
+        let is_known = |port: &PortReport| port.registers.is_some_and(|now| now.link == port.neighbour.is_some());
+        if !it.ports.iter().all(is_known) {
+            return Err(format!("cables of SubDevice {} are not known: {:?}", it.position, it.ports));
+        }
+    }
     Ok(())
 }
 
-fn explore(seeds: Range<u64>) {
+fn explore(what: &str, seeds: Range<u64>, run: impl Fn(u64) -> Result<(), String>) {
     let mut failed = Vec::new();
     for seed in seeds.clone() {
         if let Err(reason) = run(seed) {
@@ -236,12 +330,18 @@ fn explore(seeds: Range<u64>) {
             failed.push(seed);
         }
     }
-    println!("sequences: seeds {seeds:?}: {} fail", failed.len());
+    println!("{what}: seeds {seeds:?}: {} fail", failed.len());
     assert!(failed.is_empty(), "seeds {failed:?}");
 }
 
 // covers: states, stop
 #[test]
 fn seeds_of_sequences_of_calls_with_faults() {
-    explore(seeds::from_environment().unwrap_or(0..200));
+    explore("sequences", seeds::from_environment().unwrap_or(0..200), run);
+}
+
+// covers: states, stop, junctions, registers
+#[test]
+fn seeds_of_sequences_in_rings_behind_junctions() {
+    explore("rings", seeds::from_environment().unwrap_or(0..100), run_of_rings);
 }
