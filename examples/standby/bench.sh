@@ -10,16 +10,17 @@
 names=(c1 c2 plant pc)
 # Both ends of a pair need different indices: otherwise the kernel reports a lost carrier late.
 next_index=50
-# Process of each controller, and how much of its log was shown.
+# Process of each controller, and the bytes of its log that were shown.
 pids=("" "" "")
-# Not empty: it was asked to end.
+# Not empty: the controller was asked to end.
 ending=("" "" "")
 shown=(0 0 0)
 steps=0
 held=0
 title="the start"
 
-# fail REASON...: what did not hold. Ends the script, also out of `$(...)`; the last line is this verdict.
+# fail REASON...: the expectation that did not hold. Ends the script, also out of `$(...)`; the last line is this
+# verdict.
 fail() {
     [[ -e $files/verdict ]] || echo "$title: $*" >"$files/verdict"
     exit 1
@@ -75,7 +76,7 @@ start_simulator() {
     coproc simulator { within plant "$ringcat" sim --main ring0 --redundant ring1 --segment "$here/stations.toml" \
         "${thread[@]}" 2>"$files/plant.errors"; }
     set +m
-    # Those of a coprocess itself are closed in $(...).
+    # The descriptors of a coprocess are closed in $(...), so copies are made.
     exec {orders}>&"${simulator[1]}" {answers}<&"${simulator[0]}"
     order status >/dev/null
 }
@@ -120,7 +121,7 @@ ask_all_to_end() {
     kill -TERM "${processes[@]}"
 }
 
-# runs NUMBER: whether the controller runs as far as it should.
+# runs NUMBER: whether the controller runs, unless it was not started or asked to end.
 runs() {
     [[ -z ${pids[$1]} || -n ${ending[$1]} ]] || ! ended "$1"
 }
@@ -130,7 +131,7 @@ ended() {
     ! kill -0 "${pids[$1]}" 2>/dev/null
 }
 
-# finish NUMBER STATUS: its end, with this exit status.
+# finish NUMBER STATUS: waits until the controller has ended, and checks its exit status.
 finish() {
     local status=0
     await "controller $1 ends" ended "$1"
@@ -266,7 +267,7 @@ clean_up() {
     for name in "${names[@]}"; do
         mapfile -t -O "${#processes[@]}" processes < <(ip netns pids "$prefix-$name" 2>/dev/null)
     done
-    # One that was just started may not be in its namespace yet.
+    # A process that was just started may not be in its namespace yet.
     for name in "${pids[@]}" "${simulator_PID:-}"; do
         [[ -z $name ]] || processes+=("$name")
     done

@@ -53,7 +53,7 @@ pub struct Bus {
     pub firmware: Vec<Option<String>>,
     /// Idents of the modules in the slots of each SubDevice, where they were read.
     pub modules: Vec<Vec<u32>>,
-    /// The same where the list was read to its end.
+    /// Idents of the modules of each SubDevice if its list was read completely.
     pub lists: Vec<Option<Vec<u32>>>,
     /// A declared ring behind a junction that does not close.
     pub not_closed: Option<JunctionError>,
@@ -72,7 +72,7 @@ pub struct Wanted {
 
 impl BusArguments {
     /// Scans. `declared` is the network that is expected: its rings behind junctions are tested. `wanted` decides what
-    /// is read besides of a SubDevice, which goes to PREOP and back to INIT for it.
+    /// else is read from a SubDevice, which goes to PREOP for it and back to INIT.
     pub fn scan(
         &self,
         declared: Option<&Configuration>,
@@ -143,7 +143,7 @@ fn not_closed<L: Links>(main_device: &mut MainDevice<L>, declared: &Configuratio
     if declared.rings.connections.is_empty() {
         return None;
     }
-    // What is wrong in the file is a difference of its own.
+    // Errors of the file itself are reported as other differences.
     main_device.load(declared.declaration.clone()).ok()?;
     for connection in &declared.rings.connections {
         main_device.add_junction_connection(*connection).ok()?;

@@ -106,7 +106,7 @@ pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
     let verdict = if differences.is_empty() {
         let but = match unlisted.len() {
             0 => String::new(),
-            count => format!("; the modules of {count} are not compared"),
+            count => format!("; the modules of {} are not compared", counted(count, "SubDevice", "SubDevices")),
         };
         Verdict::Held(format!("{subdevices}, as in the file{but}"))
     } else {
@@ -117,7 +117,7 @@ pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
     Ok(Report { verdict, data })
 }
 
-/// A line for each difference, or several.
+/// Prints each difference in one or more lines.
 fn print(differences: &[ringcat::eni::Difference]) {
     for difference in differences {
         let mark = if difference.prevents_op { '!' } else { ' ' };
@@ -128,7 +128,8 @@ fn print(differences: &[ringcat::eni::Difference]) {
     }
 }
 
-/// Warns of SubDevices whose modules the file names and that do not list theirs. Returns their positions.
+/// Warns of SubDevices whose modules are in the file, but that do not list their modules (0xF050). Returns their
+/// positions.
 fn report_unlisted(bus: &Bus, declared: &DeclaredPdos) -> Vec<u16> {
     let mut unlisted = Vec::new();
     for (info, list) in bus.scan.subdevices.iter().zip(&bus.lists) {

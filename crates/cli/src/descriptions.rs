@@ -93,12 +93,12 @@ pub fn complete_by(
 pub struct Detected {
     /// Their idents by slot, as far as they can be read.
     pub idents: Vec<u32>,
-    /// There is a list, and it was read to its end.
+    /// The device has a list of modules, and it was read completely.
     pub is_whole: bool,
 }
 
-/// The modules that a device detects, after the list in its dictionary, of which `count` reads the length of an object
-/// and `ident` an entry. Without a list there are none.
+/// The modules that a device has detected, by the list in its dictionary. `count` reads the length of an object,
+/// `ident` an entry. Empty if the device has no list.
 pub fn detected<D>(
     device: &mut D,
     count: impl Fn(&mut D, u16) -> Option<u8>,

@@ -3,8 +3,8 @@
 //! A reader may close it: `ringcat demo | head` goes on to its end. A full disk is another matter: the output is
 //! incomplete, so the command has failed.
 //!
-//! Texts of files and devices, and names of files, may hold control characters, which a terminal obeys: whatever is
-//! printed for people passes [`visible`].
+//! Texts of files and devices, and names of files, may contain control characters that a terminal would execute: all
+//! text for operators passes through [`visible`].
 
 use std::borrow::Cow;
 use std::fmt::Arguments;
@@ -58,7 +58,8 @@ pub fn write(text: Arguments<'_>) {
     }
 }
 
-/// As [`write()`] with the control characters of the command itself: to the beginning of a line, of a table.
+/// As [`write()`], but with the control characters of this program: they move the cursor to the beginning of a line or
+/// a table.
 pub fn draw(text: Arguments<'_>) {
     if !is_json() && !is_file() {
         put(text);
@@ -134,8 +135,8 @@ pub fn warn(text: impl std::fmt::Display) {
     complain(format_args!("ringcat: {text}"));
 }
 
-/// A text without characters that change the state of a terminal or the direction of what it shows: they are written
-/// as in a string of a program. Lines and columns stay.
+/// A text without characters that change the state of a terminal or the direction of what it shows: they are written as
+/// escape sequences of Rust (`\u{1b}`). Line feeds and tabs stay.
 fn visible(text: &str) -> Cow<'_, str> {
     let is_hidden = |c: char| match c {
         '\n' | '\t' => false,

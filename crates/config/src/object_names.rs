@@ -176,8 +176,8 @@ impl ObjectNames {
         own.or_else(|| self.shared.as_ref().and_then(|shared| shared.exact(index, sub_index)))
     }
 
-    /// A message about the SubDevice with the name behind each object that it mentions as `0x6060:00`, `PDO 0x1a00` or
-    /// `object 0x6060`, and behind each `module 0x0001a001`.
+    /// A message about the SubDevice, with the name appended to each object (`0x6060:00`, `PDO 0x1a00` or `object
+    /// 0x6060`) and to each module (`module 0x0001a001`) that it mentions.
     pub fn annotate(&self, text: &str) -> String {
         let mut out = String::with_capacity(text.len());
         let mut rest = text;

@@ -353,7 +353,7 @@ impl MainDevice {
             && access.members().all(|member| member.config.optional || matches!(member.phase, Phase::Settled(_)))
     }
 
-    /// The present state of each hot connect group, by its number. Without an ACTIVE an INACTIVE knows of none that is
+    /// The present state of each hot connect group, by its number. An INACTIVE without an ACTIVE reports no group as
     /// present.
     pub fn groups(&self) -> Vec<GroupState> {
         let (counts, is_known) = (counts(self.segment.view().subdevices()), self.are_states_known());

@@ -127,8 +127,8 @@ fn mailbox_of_sii(info: &SubDeviceInfo) -> Option<Vec<SmPlan>> {
     Some(mailbox_pair(info, &layout, info.mailbox_sync_managers()))
 }
 
-/// The mailboxes of the SII beside process data of a file that has none: the SubDevice refuses PREOP without them.
-/// `None` if the file uses their SyncManagers or their memory.
+/// The mailboxes of the SII, for a file that has process data but no mailboxes: the SubDevice refuses PREOP without
+/// them. `None` if the file uses their SyncManagers or their memory.
 fn mailbox_beside(
     info: &SubDeviceInfo,
     declared: &[DeclaredSyncManager],

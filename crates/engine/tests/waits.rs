@@ -97,6 +97,7 @@ const WITHIN: [(&str, &[Reason]); 20] = [
     ("procedures/complete_siis.rs", &[Limit]),
     ("procedures/deactivate.rs", &[Limit, Limit, Limit, Limit]),
     ("procedures/dictionary.rs", &[Limit]),
+    ("procedures/idle/pause.rs", &[Limit]),
     ("procedures/idle/rescue.rs", &[Limit]),
     // What has been read so far is used in each pause.
     ("procedures/inspect.rs", &[Pace]),
@@ -105,7 +106,6 @@ const WITHIN: [(&str, &[Reason]); 20] = [
     ("procedures/request_states.rs", &[Limit]),
     ("procedures/serve_requests.rs", &[Limit]),
     ("procedures/services/statistics.rs", &[Cyclic]),
-    ("procedures/services/open_ring.rs", &[Limit]),
     ("procedures/shared_segment.rs", &[Limit, Limit]),
     ("procedures/undeclared/keep.rs", &[Retry]),
 ];

@@ -78,7 +78,7 @@ pub(crate) struct Cyclic {
     under_way: u32,
     /// A cycle is due and waits because the acyclic half requests a pause.
     held: bool,
-    /// The last cycles wait for no pause.
+    /// The last cycles do not wait for a pause.
     ends: bool,
     window: Arc<Window>,
     /// Number of disturbances that the cyclic status includes.
@@ -127,7 +127,7 @@ impl Cyclic {
         }
     }
 
-    /// The last cycles begin: they follow the time, and no measurement holds them back.
+    /// The last cycles begin: they start by time, and a measurement no longer delays them.
     pub fn begin_last(&mut self) {
         self.set_trigger(Trigger::Time);
         self.ends = true;

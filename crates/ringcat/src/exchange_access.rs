@@ -66,8 +66,9 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.cyclic.exchange.set_timeout(domain, timeout);
     }
 
-    /// Gives back the memory of the caller that holds the image of a domain, as long as the image. The image continues
-    /// in own memory. Not for the cyclic path: this allocates. `None` where the image is in own memory.
+    /// Returns the memory that the caller gave for the image of a domain, in the length of the image. From then on the
+    /// image is in memory of the library. Not for the cyclic path: this allocates. `None` if the image is in memory of
+    /// the library already.
     pub fn give_memory_back(&mut self, domain: DomainId) -> Option<&'static mut [u8]> {
         self.cyclic.exchange.give_memory_back(domain)
     }

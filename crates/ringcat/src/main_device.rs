@@ -207,7 +207,7 @@ impl<L: Links> MainDevice<L> {
         Ok(self.engine.add_junction_connection(connection).map_err(ActivateError::Junction)?)
     }
 
-    /// Before the last step, which does the same: tests whether the added rings close as declared. Nothing is
+    /// Tests whether the added rings close as declared, without the last step (which makes the same test). Nothing is
     /// configured.
     ///
     /// # Errors

@@ -377,7 +377,7 @@ fn truth(world: &mut World) -> Vec<Place> {
     places(world.network(), &before)
 }
 
-/// The datagram with which all latch a frame.
+/// The datagram at which all SubDevices latch their receive times.
 fn spread_broadcast() -> RawDatagram {
     RawDatagram::new(Command::Bwr, Target::Broadcast(map::DC_RECEIVE_TIME), vec![0; 4])
 }

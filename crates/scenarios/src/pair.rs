@@ -113,12 +113,12 @@ impl Pair {
         self.start(host, Phase::Inactive, member::eager_member);
     }
 
-    /// As [`Pair::start_member`], of one that takes over on request only.
+    /// As [`Pair::start_member`], with a member that takes over on request only.
     pub fn start_permanent_standby(&mut self, host: Host) {
         self.start(host, Phase::Inactive, member::permanent_standby);
     }
 
-    /// As [`Pair::start_member`], of one that becomes INACTIVE in a collision, whatever the addresses are.
+    /// As [`Pair::start_member`], with a member that becomes INACTIVE in a collision, whatever the addresses are.
     pub fn start_yielding_member(&mut self, host: Host) {
         self.start(host, Phase::Inactive, member::yielding_member);
     }

@@ -1,5 +1,5 @@
-//! Networks of files on buses that were changed at random, with SYNC signals, modules in slots, and process data that is
-//! left to the EEPROM or assigned by start-up commands: `compare` marks a
+//! Networks of files on buses that were changed at random, with SYNC signals, modules in slots, and process data that
+//! is left to the EEPROM or assigned by start-up commands: `compare` marks a
 //! difference that prevents OP exactly if the network does not reach OP there, by the network file and by its ENI.
 
 use std::path::Path;
@@ -210,7 +210,8 @@ fn differences_are_marked_exactly_if_a_changed_bus_does_not_reach_op() {
         if eni.is_none() || dice.one_in(2) {
             eni = None;
             file.subdevice = plain.subdevice;
-            // Of two alike the engine may take the other one as the absent one: its modules differ then.
+            // Of two equal SubDevices the engine may take the other one as absent: then the modules of the remaining
+            // one differ.
             for (it, unit) in file.subdevice.iter_mut().zip(&units) {
                 it.optional = !unit.is_modular() && dice.one_in(4);
             }

@@ -44,7 +44,7 @@ fn differences(configuration: &Configuration, stated: &[Stated], scan: &Scan) ->
     if texts.is_empty() { Ok(()) } else { Err(texts.join("; ")) }
 }
 
-/// The PDOs of each SyncManager with process data, as one declaration or the other states them.
+/// The PDOs of each SyncManager with process data, as the declaration states them.
 fn pdos(configuration: &Configuration) -> BTreeMap<u8, Vec<PdoMapping>> {
     let of = &configuration.declaration.subdevices[0];
     let plain = |pdos: &[PdoMapping]| pdos.iter().map(|pdo| pdo.clone().with_fixed(false)).collect();
@@ -65,7 +65,7 @@ fn same<T: PartialEq + std::fmt::Debug>(what: &str, expected: &T, got: &T) -> Re
     if expected == got { Ok(()) } else { Err(format!("{what}: expected {expected:?}, got {got:?}")) }
 }
 
-/// What is wrong with the files of a network with this device alone.
+/// Errors in the files of a network of this device alone.
 fn check(scan: &Scan) -> Result<(), String> {
     let made = NetworkFile::from_scan(&scan.subdevices, &scan.topology, &ScanOptions::new("one", PERIOD));
     let network = LoadedNetwork::from_bytes("one.toml", made.to_text().as_bytes()).map_err(|it| it.to_string())?;
@@ -82,7 +82,7 @@ fn check(scan: &Scan) -> Result<(), String> {
     differences(&eni.configuration, &eni.stated(), scan).map_err(|it| format!("compared with the ENI: {it}"))
 }
 
-/// What differs between a declaration from the description alone and the device of the same description.
+/// Differences between a declaration made from the description alone and the simulated device of that description.
 fn check_declared(scan: &Scan, esi: &esi::Esi, device: &esi::Device) -> Result<(), String> {
     let choices = esi::Choices::default();
     // A device that cannot be declared without choices has nothing to compare.

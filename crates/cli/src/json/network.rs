@@ -36,7 +36,7 @@ pub struct Compare {
     pub found: usize,
     /// The differences, in the order of the file
     pub differences: Vec<Difference>,
-    /// Positions of SubDevices whose modules the file names, and that do not list theirs
+    /// Positions of SubDevices whose modules are in the file, but not compared: they do not list them (0xF050)
     pub modules_not_compared: Vec<u16>,
 }
 
@@ -47,7 +47,7 @@ pub struct Difference {
     /// missing, additional, order, device, revision, serial, identification, pdos, mailbox, protocols, sync manager,
     /// ports, process data, firmware, cable, modules, clocks or ring
     pub kind: String,
-    /// Index of the SubDevice in the file, from 0; null for one that is not in it, and for a ring
+    /// Index of the SubDevice in the file, from 0; null for a SubDevice that is not in the file, and for a ring
     pub subdevice: Option<usize>,
     /// Its name in the file; null for one that is not in it
     pub name: Option<String>,

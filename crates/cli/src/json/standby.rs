@@ -45,7 +45,7 @@ pub struct Takeover {
     pub warm_takeovers: u64,
     /// Frames of another ACTIVE that were reported
     pub collisions: u64,
-    /// Alarms: no ACTIVE was there, and this one did not take over
+    /// Number of alarms: no ACTIVE, and this MainDevice did not take over
     pub alarms: u64,
     /// Differences of the configuration that were reported
     pub configuration_differences: u64,

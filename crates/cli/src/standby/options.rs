@@ -114,8 +114,8 @@ pub struct PolicyArguments {
     permanent_standby: bool,
     /// End if the watchdog of a SubDevice is too short for a takeover
     ///
-    /// Outputs may be missing for --timeout and two cycles: then such a SubDevice leaves OP. Without this option it is
-    /// named.
+    /// During a takeover, outputs may be missing for --timeout and two cycles: such a SubDevice then leaves OP. Without
+    /// this option it is only reported.
     #[arg(long, requires = "declaration", conflicts_with = "permanent_standby")]
     pub strict: bool,
 }

@@ -141,7 +141,7 @@ impl Controller<'_> {
         self.end.is_asked() || now() >= self.until || self.beats.has_acted.load(Ordering::Relaxed)
     }
 
-    /// Whether SubDevices have watchdogs that are too short for a takeover, and are refused for that.
+    /// Whether the program ends because watchdogs of SubDevices are too short for a takeover (`--strict`).
     fn refuses_watchdogs(&self) -> bool {
         self.arguments.policy.strict && !self.events.short_watchdogs.is_empty()
     }

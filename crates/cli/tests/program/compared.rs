@@ -51,8 +51,8 @@ fn another_assignment_of_a_device_with_coe_is_named_in_both_directions() {
     assert!(folded(&differs).contains(expected) && !differs.out.contains('!'), "{}", differs.all());
 }
 
-/// Modules are compared by slot: with the names of the description, by network file and by ENI. A device without a list
-/// is named.
+/// Modules are compared by slot: with the names of the description, by network file and by ENI. A warning names a
+/// device without a list.
 // covers: network-file, ES-69, ES-70
 #[test]
 fn modules_that_are_not_those_of_the_file_are_named_by_slot() {
@@ -86,7 +86,7 @@ fn modules_that_are_not_those_of_the_file_are_named_by_slot() {
     }
     bus("unlisted.xml", "\"csp axis\"");
     let said = compare(&both[0], &[]);
-    let verdict = "result: ok: 1 SubDevice, as in the file; the modules of 1 are not compared";
+    let verdict = "result: ok: 1 SubDevice, as in the file; the modules of 1 SubDevice are not compared";
     assert_eq!(said.verdict(), verdict, "{}", said.all());
     assert!(said.all().contains("its modules are not compared: it does not list them (0xF050)"), "{}", said.all());
     let json = compare(&both[0], &["--json"]).out;
@@ -115,7 +115,7 @@ fn rings_that_do_not_exist_are_named() {
     assert_eq!(compare(&to("block 3")).code, Some(0));
     for (redundancy, expected) in [
         (to("block 2"), "! ring junction connection 1:1-3:1: SubDevice 3 port 1 does not lead back to"),
-        ("ring = true\n".to_owned(), "! ring the file declares a ring (redundancy.ring), and the network is a line"),
+        ("ring = true\n".to_owned(), "! ring the file declares a ring (redundancy.ring), but the network is a line"),
     ] {
         let said = compare(&redundancy);
         assert!(folded(&said).starts_with(expected), "{}", said.all());

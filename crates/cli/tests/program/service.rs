@@ -9,7 +9,7 @@ use crate::files::{Place, ringcat};
 const UNIT: &str = "ringcat-standby@.service";
 const SEGMENT: &str =
     "[segment]\nring = true\n[[device]]\ntype = \"coupler\"\n[[device]]\ntype = \"digital-output-4\"\n";
-/// The most that `systemd-analyze security` may find, in tenths.
+/// Maximum exposure level that `systemd-analyze security` may report, in tenths.
 const EXPOSURE: &str = "--threshold=35";
 
 fn packaged(name: &str) -> String {
@@ -89,11 +89,11 @@ fn unit(place: &Place) -> PathBuf {
 
 // covers: standby
 #[test]
-fn systemd_accepts_the_template_and_finds_little_exposed() {
+fn systemd_accepts_the_template_and_rates_its_exposure_as_low() {
     let place = Place::new("unit");
     let unit = unit(&place);
     let Some((verified, about)) = analyze(&["verify", "--man=no"], &unit) else { return };
-    // Unknown keys are lines with the path, and no failure.
+    // An unknown key does not fail: systemd prints a line with the path of the unit.
     let is_named = about.lines().any(|line| line.contains("ringcat-standby"));
     assert!(verified.status.success() && !is_named, "{about}");
     let (security, about) = analyze(&["security", "--offline=yes", EXPOSURE], &unit).expect("it is there");

@@ -1,4 +1,4 @@
-//! What a terminal would obey instead of showing it: control characters in files and in their names.
+//! Control characters in files and in their names, which a terminal would execute instead of showing them.
 
 use crate::files::{Place, Said, ringcat};
 

@@ -36,7 +36,7 @@ pub(super) fn differences(
         differences.push(Difference { subdevice, position, kind, prevents_op, text });
     };
     if *is_ring && !network.has_redundant {
-        let text = "the file declares a ring (redundancy.ring), and the network is a line: there is no redundant link";
+        let text = "the file declares a ring (redundancy.ring), but the network is a line: there is no redundant link";
         add(None, DifferenceKind::Ring, true, text.to_owned());
     }
     let found = obstacles(&declaration, (*junctions, connections), network.subdevices, links);

@@ -76,7 +76,7 @@ fn wanted(declared: &SubDeviceConfig) -> BTreeMap<u8, Option<Vec<u16>>> {
 }
 
 /// Whether a PDO is for tools only: the SII lists it, the SubDevice has no object for it (protocol ES-47). A
-/// declaration from a description does not have it.
+/// declaration that is made from a description does not contain it.
 pub(super) fn is_virtual(index: u16, info: &SubDeviceInfo) -> bool {
     info.pdo(index).is_some_and(|pdo| pdo.flags & Pdo::VIRTUAL != 0)
 }

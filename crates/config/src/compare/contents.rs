@@ -29,7 +29,7 @@ pub(super) struct Both<'a> {
     pub(super) info: &'a SubDeviceInfo,
     /// Version of its firmware, if it was read.
     pub(super) firmware: Option<&'a str>,
-    /// The modules that it has detected, if they were read.
+    /// The modules that the SubDevice has detected, if they were read.
     pub(super) modules: Option<&'a [u32]>,
     /// The activation fails because of its place or its identity.
     pub(super) fails: bool,
@@ -55,7 +55,7 @@ impl Both<'_> {
             && planned.warnings.contains(&PlanWarning::MailboxOfSii)
         {
             let got = words(planned.mailbox_layout().as_ref().map(buffers));
-            let text = format!("the file has no mailboxes, got {got}: those of the SII are used");
+            let text = format!("the file has no mailboxes, got {got}: the mailboxes of the SII are used");
             add(DifferenceKind::Mailbox, false, text);
         }
         for (kind, prevents_op, text) in properties::differences(declared, stated, info) {

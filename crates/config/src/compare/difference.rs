@@ -169,7 +169,7 @@ pub struct FoundNetwork<'a> {
 }
 
 impl<'a> FoundNetwork<'a> {
-    /// A network on one link, of which nothing was read besides.
+    /// A network on one link, without firmware versions, modules and tests of rings.
     pub const fn new(subdevices: &'a [SubDeviceInfo], topology: &'a Topology) -> FoundNetwork<'a> {
         let (firmware, modules) = (&[], &[]);
         FoundNetwork { subdevices, topology, firmware, modules, has_redundant: false, not_closed: None }

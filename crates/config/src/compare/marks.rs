@@ -57,13 +57,14 @@ impl Marks {
         }
     }
 
-    /// Whether the activation goes on without the SubDevice of this declaration, also where it is at another place.
+    /// Whether the activation goes on without the SubDevice of this declaration, also if the SubDevice is at another
+    /// position.
     pub(super) fn is_absent(&self, config: usize) -> bool {
         matches!(self.resolutions.get(config), Some(Resolution::Absent { .. })) && !self.fails(config)
     }
 
     /// Whether a SubDevice that is missing prevents OP: unless it is optional, and no declaration behind it is shifted.
-    /// Never where the engine finds all: then it takes another one as the absent one.
+    /// Never if the engine finds all declared SubDevices: then the engine takes another SubDevice as the absent one.
     pub(super) fn misses(&self, config: usize, declared: &SubDeviceConfig) -> bool {
         let shifts = self.shifted.iter().any(|(other, _)| *other > config);
         self.first_failing().is_some() && (self.fails(config) || !declared.optional || shifts)

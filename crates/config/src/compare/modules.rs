@@ -8,7 +8,7 @@ use ringcat_wire::al::AlState;
 
 /// The list of idents that the MainDevice writes.
 const CONFIGURED: u16 = 0xF030;
-/// The way to OP.
+/// The transitions on the way to OP.
 const WAY: [Transition; 3] = [Transition::Ip, Transition::Ps, Transition::So];
 /// Bytes of an ident.
 const IDENT: usize = 4;

@@ -14,7 +14,7 @@ use crate::configuration::Configuration;
 #[derive(Clone, Debug)]
 pub struct DeclaredPdos {
     pdos: BTreeMap<DeviceKey, BTreeSet<u16>>,
-    /// Of these the file names the modules in their slots.
+    /// SubDevices for which the file has the modules in their slots.
     modular: BTreeSet<DeviceKey>,
 }
 

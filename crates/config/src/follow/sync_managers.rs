@@ -173,7 +173,7 @@ fn pdos(
     described.into_iter().map(mapping).collect()
 }
 
-/// The PDOs of a disabled SyncManager: those without entries are assigned, though nothing is exchanged.
+/// The PDOs of a disabled SyncManager: PDOs without entries are assigned, although no data is exchanged.
 fn empty_pdos(one: &DeclaredSyncManager, process_data: &ProcessData) -> Vec<PdoMapping> {
     let described = mapped(one, process_data).unwrap_or_default();
     let are_empty = described.iter().all(|pdo| pdo.entries.is_empty());

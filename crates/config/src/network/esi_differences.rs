@@ -158,7 +158,7 @@ fn of_mailbox(name: &str, buffer: Buffer, device: &Device, role: SyncManagerRole
 
 /// The first entry that differs.
 fn of_entries(entries: &[Entry], described: &[esi::PdoEntry]) -> Option<String> {
-    // These are split.
+    // Entries that are longer than 255 bits are split in a declaration.
     if described.iter().any(|it| it.bit_length > u8::MAX.into()) {
         return None;
     }

@@ -19,7 +19,7 @@ use crate::export::{Export, ExportDetails, ExportError, ExportOptions, LeftOut, 
 /// Control bytes of mailboxes (protocol 3.11).
 const MAILBOX_OUT: u8 = 0x26;
 const MAILBOX_IN: u8 = 0x22;
-/// Those of process data: three buffers, event to the PDI for outputs.
+/// Control bytes of SyncManagers of process data: three buffers, event to the PDI for outputs.
 const OUTPUTS: u8 = 0x24;
 const INPUTS: u8 = 0x20;
 /// Watchdog enable in the control byte.
@@ -85,15 +85,15 @@ fn is_coupler(of: &SubDevice) -> bool {
     has_branches && of.mailbox.is_none() && of.domain.is_none() && of.sync.is_none()
 }
 
-/// Mailboxes that a file leaves to the EEPROM. A SubDevice whose ports the file has was scanned or described: it has
-/// none.
+/// Mailboxes that a file leaves to the EEPROM. If the file has the ports of a SubDevice, the entry comes from a scan or
+/// a description: such a SubDevice has no mailbox.
 fn mailboxes(file: &NetworkFile) -> Vec<LeftOut> {
     let subdevices = (0..).zip(&file.subdevice).filter(|(_, of)| of.mailbox.is_none());
     let (with_commands, others): (Vec<_>, Vec<_>) = subdevices.partition(|(_, of)| of.startup.iter().any(is_mail));
     let advice = "`ringcat init` and `ringcat esi declare` write the table `[subdevice.mailbox]`";
     let reason = format!(
-        "start-up commands need one, and the file leaves it to the EEPROM, where RingCAT finds it; other MainDevices \
-         cannot send them: {advice}"
+        "start-up commands need a mailbox, and the file has none: RingCAT takes it from the EEPROM, other MainDevices \
+         may not send these commands: {advice}"
     );
     let mut left_out: Vec<_> =
         with_commands.iter().map(|(index, _)| LeftOut::new(*index, "mailbox", reason.clone())).collect();
@@ -153,7 +153,7 @@ fn declared(
         if found.iter().any(|other| other.index == it.number) {
             return Err(refused("a mailbox uses it"));
         }
-        // The file says nothing of its process data.
+        // The file does not declare process data for this SyncManager.
         if it.pdo.is_empty() && it.length == Some(0) {
             continue;
         }
@@ -199,8 +199,8 @@ fn length(of: &SyncManager) -> Option<u16> {
     Some(of.length.unwrap_or_else(|| u16::try_from(bits.div_ceil(8)).unwrap_or(u16::MAX)))
 }
 
-/// A disabled SyncManager has no memory, so its control byte does not matter; a register of zeros would be one that was
-/// cleared.
+/// A disabled SyncManager has no memory, so its control byte does not matter; a control byte of 0 would mean that the
+/// SyncManager is cleared.
 fn control_while_disabled(of: &SyncManager) -> u8 {
     let is_cleared = |control: &u8| control & !WATCHDOG == 0;
     of.control.filter(|control| !is_cleared(control)).unwrap_or(match of.direction {

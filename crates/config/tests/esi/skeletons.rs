@@ -1,6 +1,7 @@
 //! Descriptions made of images: each field that is lost on the way has a notice.
 
 use std::fs;
+use std::time::{Duration, Instant};
 
 use ringcat_config::esi;
 use ringcat_config::esi::sii::{self, Comparison, SiiOptions, SiiProfile};
@@ -99,13 +100,29 @@ fn categories_of_vendors_are_kept_whatever_their_number() {
     }
 }
 
+// covers: esi-use, ES-72
+#[test]
+fn a_description_of_30000_categories_is_made_in_linear_time() {
+    const COUNT: u16 = 30_000;
+    let image = terminal(|image| {
+        image.truncate(Sii::parse(image).unwrap().used() - 2);
+        (0..COUNT).for_each(|number| image.extend([(number + 1_000).to_le_bytes(), [1, 0], [7, 7]].concat()));
+        image.extend([0xff; 2]);
+    });
+    let begin = Instant::now();
+    let made = sii::skeleton(&image).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(made.text.matches("<Category>").count(), COUNT.into(), "{:?}", made.notices.first());
+    // A search among all categories for each took 30 s.
+    assert!(begin.elapsed() < Duration::from_secs(5), "{:?}", begin.elapsed());
+}
+
 // covers: ES-105, esi-use
 #[test]
-fn what_images_of_vendors_lose_in_a_description_is_a_notice_and_listed() {
+fn fields_that_images_of_vendors_lose_in_a_description_are_listed_notices() {
     let mut found = String::new();
     for path in files("sii").iter().filter(|path| path.extension().is_some_and(|ending| ending == "bin")) {
         let image = fs::read(path).unwrap();
-        // One is damaged.
+        // One image is damaged.
         if Sii::parse(&image).is_err() {
             continue;
         }
@@ -120,7 +137,7 @@ fn what_images_of_vendors_lose_in_a_description_is_a_notice_and_listed() {
         let is_lost = |it: &&sii::FieldDifference| {
             let field = it.field.as_str();
             let counts = !it.is_individual && !it.expected.is_empty() && !OF_A_TOOL.contains(&field);
-            // Another tool may write a field that the most alike one leaves out.
+            // Another tool may write a field that the most similar tool leaves out.
             counts && !has_notice(field) && !is_written(&made, &image, field)
         };
         let silent: Vec<_> = compared.differences.iter().filter(is_lost).collect();

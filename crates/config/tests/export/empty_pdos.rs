@@ -35,7 +35,7 @@ fn a_pdo_without_entries_is_in_the_eni_and_stays_assigned() {
 /// As the EK1960 has them: start 0, control byte 0.
 // covers: eni-run
 #[test]
-fn an_empty_sync_manager_of_zeros_is_none_that_was_cleared() {
+fn a_sync_manager_of_zeros_without_pdos_is_not_read_as_cleared() {
     for keys in ["", "op_only = true\n", "watchdog = false\n"] {
         let zeros = format!("start = 0x0000\ncontrol = 0x00\n{keys}");
         let text = cell("").replacen("start = 0x1300\ncontrol = 0x20\n", &zeros, 1);

@@ -97,7 +97,7 @@ fn settings_that_an_eni_has_no_place_for_are_listed() {
 /// a scan or a description.
 // covers: eni-run
 #[test]
-fn mailboxes_that_are_left_to_the_eeprom_are_listed_where_one_may_be_lacking() {
+fn mailboxes_left_to_the_eeprom_are_listed_if_a_subdevice_may_need_one() {
     let listed = |file: &NetworkFile| -> Vec<(Option<usize>, String)> {
         let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
         let left_out = export.left_out.into_iter().filter(|it| it.what == "mailbox");
@@ -112,7 +112,7 @@ fn mailboxes_that_are_left_to_the_eeprom_are_listed_where_one_may_be_lacking() {
     assert_eq!(listed(&file), [], "a simple terminal of a scan");
     file.subdevice[1].mailbox = None;
     let [(Some(1), of_drive)] = &listed(&file)[..] else { panic!("{:?}", listed(&file)) };
-    assert!(of_drive.contains("start-up commands need one"), "{of_drive}");
+    assert!(of_drive.contains("start-up commands need a mailbox"), "{of_drive}");
     let registers = |it: &Startup| it.write.is_some() || it.check.is_some();
     file.subdevice[1].startup.retain(registers);
     assert_eq!(listed(&file), [], "commands to registers need none");

@@ -58,7 +58,7 @@ fn one_missing_or_additional_subdevice_is_one_difference() {
 /// Rows of alike devices between them could also be paired one place further.
 // covers: network-file
 #[test]
-fn two_that_have_changed_places_around_a_row_are_one_difference() {
+fn two_subdevices_swapped_around_a_row_are_one_difference() {
     for (file, found) in [
         ([1, 2, 2, 3, 3, 2], [2, 2, 2, 3, 3, 1]),
         ([4, 3, 2, 3, 1, 3], [3, 3, 2, 3, 1, 4]),

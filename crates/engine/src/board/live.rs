@@ -189,14 +189,14 @@ impl LiveWords {
         self.silence.store(number << 8 | losses.min(LOSSES), Ordering::Relaxed);
     }
 
-    /// The ACTIVE has not reported anything since the result with this number: what it reported last is kept for a
-    /// takeover, and is not known any more to readers.
+    /// The ACTIVE has not reported anything since the result with this number: its last report is kept for a takeover,
+    /// but readers get `unknown`.
     #[cfg(feature = "standby")]
     pub(super) fn post_no_active(&self, number: u64) {
         self.silence.store(number << 8 | LOSSES, Ordering::Relaxed);
     }
 
-    /// This MainDevice is ACTIVE: what was reported last counts until its own frames show more.
+    /// This MainDevice is ACTIVE: the last report of the former ACTIVE is valid until its own frames return.
     #[cfg(feature = "standby")]
     pub(crate) fn end_silence(&self) {
         self.silence.store(0, Ordering::Relaxed);

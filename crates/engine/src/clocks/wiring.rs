@@ -80,8 +80,8 @@ impl Wiring {
 
     /// The ports to close so that every whole ring is open: both ends of the closing cable of a ring behind a junction,
     /// if frames enter all its members at port 0; the port of the redundant link in a closed ring of two links. With
-    /// several open ports, or an unconnected port 0, it is not known which one that is, as with unknown rings behind
-    /// junctions: a wrong one would cut off SubDevices.
+    /// more than one open port, or an unconnected port 0, the port of the redundant link is not certain, for example
+    /// with unknown rings behind junctions: closing a wrong port would cut off SubDevices.
     pub fn whole_rings(
         &self,
         topology: &Topology,

@@ -65,18 +65,18 @@ pub enum StandbyEvent {
     /// change would cut it off ([`RoleControl::force`](crate::role::RoleControl::force)).
     RoleRefused(MemoryWrite),
     /// No ACTIVE sends process data, and this MainDevice is not allowed to take over, or has no link: outputs of the
-    /// SubDevices stay as they are or are switched off by their watchdogs. After the time-out of the policy, or three
-    /// times it where the policy takes over; before an application after the time of listening, or twice it. Once per
-    /// silence; the next event is [`StandbyEvent::ActiveIsBack`] or [`StandbyEvent::RoleChanged`]. Without a policy it
-    /// is not reported.
+    /// SubDevices stay as they are or are switched off by their watchdogs. Reported after the time-out of the policy
+    /// (three times the time-out if the policy takes over); before an application, after the time of listening (twice
+    /// that time if the policy takes over). Reported once until an ACTIVE sends again; the next event is
+    /// [`StandbyEvent::ActiveIsBack`] or [`StandbyEvent::RoleChanged`]. Without a policy it is not reported.
     NoActive {
         /// Time since the last process data of an ACTIVE, or since this MainDevice began to wait for one.
         silence: Duration,
     },
-    /// After [`StandbyEvent::NoActive`]: an ACTIVE is there.
+    /// After [`StandbyEvent::NoActive`]: an ACTIVE sends process data again.
     ActiveIsBack,
-    /// The watchdog of a SubDevice with outputs, as declared, is not longer than process data may be missing in a
-    /// takeover: it leaves OP in one. Once when the policy is set.
+    /// The declared watchdog of a SubDevice with outputs is not longer than the time for which process data may be
+    /// missing in a takeover: the SubDevice leaves OP during a takeover. Reported once when the policy is set.
     WatchdogTooShort {
         /// The SubDevice.
         subdevice: SubDeviceId,

@@ -68,7 +68,8 @@ pub(crate) struct Following {
     /// When the first master frame of the newest cycle arrived.
     begun_at: Instant,
     pub unusable: Option<Unusable>,
-    /// Another ACTIVE is followed, or the same one that has begun anew, since [`Following::take_anew`].
+    /// Since the last [`Following::take_anew`] this INACTIVE has begun to follow another ACTIVE, or the same one after
+    /// a restart.
     is_anew: bool,
     /// The answer, without what depends on the cycle.
     pub answer: Answer,
@@ -123,13 +124,13 @@ impl Following {
         self.has_whole && self.whole.cycle.wrapping_sub(cycle) as i32 >= 0
     }
 
-    /// Whether another ACTIVE is followed since the last call, or the same one that has begun anew: what is known of
-    /// the one before counts no more.
+    /// Whether this INACTIVE has begun to follow another ACTIVE since the last call, or the same one after a restart:
+    /// what is known of the previous session is no longer valid.
     pub fn take_anew(&mut self) -> bool {
         core::mem::take(&mut self.is_anew)
     }
 
-    /// Another ACTIVE is followed, or the same one has begun anew.
+    /// This INACTIVE begins to follow another ACTIVE, or the same one after a restart.
     fn begin_anew(&mut self, sender: Option<[u8; 3]>) {
         self.reset();
         (self.sender, self.is_anew) = (sender, true);

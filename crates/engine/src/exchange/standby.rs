@@ -125,9 +125,9 @@ impl Exchange {
         self.events.push(event.pack());
     }
 
-    /// The application ends: the role is not offered from now on, and an offer is withdrawn. One whose last cycle has
-    /// gone still yields with the next cycle. Otherwise the other MainDevice would become ACTIVE while this one stops
-    /// the SubDevices.
+    /// The application ends: the role is not offered from now on, and an offer is withdrawn. If this MainDevice has
+    /// already sent its last cycle as ACTIVE, it becomes INACTIVE with the next cycle. Otherwise the other MainDevice
+    /// would become ACTIVE while this one stops the SubDevices.
     pub fn end_offers(&mut self) {
         if let Some(state) = self.standby.0.as_deref_mut() {
             state.offers = Offers::Ended;

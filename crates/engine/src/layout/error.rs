@@ -29,10 +29,10 @@ pub enum LayoutError {
     /// With MainDevice redundancy: the frames of a cycle do not fit into it at 100 Mbit/s.
     CycleTooShort {
         /// Time on the wire in a cycle in which all domains are exchanged, with master frames and one acyclic frame
-        /// (of 1,514 bytes with Ethernet between both); two passes of the other MainDevice, which forwards whole
-        /// frames, included.
+        /// (of 1,514 bytes with Ethernet between both MainDevices), and twice the time in which the other MainDevice
+        /// forwards a frame: it receives a frame completely before it sends it.
         needed: Duration,
-        /// The shortest period, times the number of cycles that may be under way.
+        /// The shortest period, multiplied by the number of cycles that may be on the wire.
         period: Duration,
     },
 }
@@ -53,8 +53,8 @@ impl fmt::Display for LayoutError {
             ),
             LayoutError::CycleTooShort { needed, period } => write!(
                 f,
-                "the frames of a cycle take {} us on the wire, with master frames, one acyclic frame, and two passes \
-                 of the other MainDevice: they do not fit into {} us",
+                "the frames of a cycle take {} us on the wire, with the master frames, one acyclic frame, and \
+                 forwarding by the other MainDevice (up to twice): they do not fit into {} us",
                 needed.as_nanos().div_ceil(1_000),
                 period.as_nanos() / 1_000
             ),

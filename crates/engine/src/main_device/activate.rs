@@ -15,7 +15,6 @@ use super::declaration::Declaration;
 use super::lay_out::lay_out;
 use super::live_status::LiveStatus;
 use super::loaded::Loaded;
-use super::lrw;
 use super::obstacles::replaced;
 use super::prepare::{check_clocks, check_domains, match_declaration, members, plan_all, report_oddities, with_domain};
 use super::repeats;
@@ -113,7 +112,7 @@ impl MainDevice {
         let (links, supervision) = (self.options.links(), self.options.supervision);
         let max_datagrams = self.options.most_datagrams();
         #[cfg(feature = "standby")]
-        if self.is_lrw_refused(lrw::policy(declaration.lrw, &declaration.explicit_lrw, links)?) {
+        if self.is_lrw_refused(super::lrw::policy(declaration.lrw, &declaration.explicit_lrw, links)?) {
             return Err(ActivateError::LrwWithStandby);
         }
         let rules = Rules { links, supervision, lrw: declaration.lrw, witnesses: &[], session, max_datagrams };
@@ -122,7 +121,7 @@ impl MainDevice {
         Ok((specs, layout))
     }
 
-    /// Reports that a declared reference clock is none.
+    /// Reports that the SubDevice declared as the reference clock has no clock.
     fn report_reference(&self, replaced: Option<(SubDeviceId, Option<Position>)>) {
         let Some((subdevice, instead)) = replaced else { return };
         let oddity = Oddity::Reference { instead };

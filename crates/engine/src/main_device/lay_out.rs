@@ -11,8 +11,8 @@ use super::prepare::{domain_specs, witnesses};
 use crate::info::SubDeviceInfo;
 use crate::layout::{DomainSpec, Layout, Rules};
 
-/// The domains, and the places of their process data. Policy of LRW and witnesses in `rules` are those of the
-/// declaration.
+/// The domains, and the places of their process data. The declaration replaces the policy of LRW and the witnesses in
+/// `rules`.
 pub(super) fn lay_out(
     declaration: &Declaration,
     plans: &[Areas],

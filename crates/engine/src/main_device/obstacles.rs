@@ -1,5 +1,6 @@
-//! What an activation refuses, for comparisons with a scan that activate nothing. The checks are those of the
-//! activation ([`super::prepare`], [`super::lay_out`]); here all are made, where an activation ends at the first.
+//! What an activation would refuse, for comparisons of a declaration with a scan that do not activate it. The checks
+//! are those of the activation ([`super::prepare`], [`super::lay_out`]). All checks are made here; an activation ends
+//! at the first that fails.
 
 use alloc::rc::Rc;
 use alloc::vec;
@@ -21,9 +22,9 @@ use crate::link::LinkSet;
 use crate::segment::setup::Setup;
 
 /// Everything with which [`MainDevice::activate`](super::MainDevice::activate) would refuse a declaration on the
-/// SubDevices of a scan, and SYNC signals of a SubDevice that fails alone. Not contained are missing and other
-/// SubDevices ([`resolve`]), process data that a SubDevice cannot have ([`plan`](crate::plan)), and closing cables that
-/// are not there, which only a test on the bus shows
+/// SubDevices of a scan, and SYNC signals that only prevent OP of their own SubDevice. Not contained are missing
+/// SubDevices and SubDevices of another type ([`resolve`]), process data that a SubDevice cannot have
+/// ([`plan`](crate::plan)), and closing cables that are not there, which only a test on the bus shows
 /// ([`MainDevice::start_connection_check`](super::MainDevice::start_connection_check)).
 pub fn obstacles(
     declaration: &Declaration,
@@ -58,8 +59,8 @@ pub fn obstacles(
     obstacles
 }
 
-/// A declared reference clock that is none, because its SubDevice has no clock, and the position of the clock that
-/// takes its place.
+/// A SubDevice that is declared as the reference clock but has no clock, and the position of the clock that is used
+/// instead.
 pub fn replaced_reference(
     declaration: &Declaration,
     found: &[SubDeviceInfo],

@@ -90,8 +90,9 @@ impl MainDevice {
     }
 
     /// SubDevices with outputs whose watchdog, as declared, is not longer than process data may be missing in a
-    /// takeover: its time, and that time. `gap`: how long cycles of the period `cycle` may be missing; outputs of a
-    /// domain with a longer period come later by as much. Empty before there is an application.
+    /// takeover: each with the time of its watchdog and the time that is needed. `gap`: how long cycles of the period
+    /// `cycle` may be missing; in a domain with a longer period outputs may be missing longer, by the difference of the
+    /// periods. Empty before there is an application.
     pub fn watchdogs_within(&self, gap: Duration, cycle: Duration) -> Vec<(SubDeviceId, Duration, Duration)> {
         let view = self.segment.view();
         let short = |(index, member): (usize, MemberView<'_>)| {

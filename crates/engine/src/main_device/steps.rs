@@ -77,7 +77,7 @@ impl MainDevice {
             let Some(loaded) = loaded else { return Ok(()) };
             let (testing, of) = (bus.clone(), segment.clone());
             let test = async move {
-                // By the scan that counts once idle operation has ended its work.
+                // Positions and addresses are those of the scan that is valid after idle operation has ended its work.
                 let declared = DeclaredClosings::of(&loaded, of.view().found()?);
                 let closings: Vec<Closing> = declared.closings.iter().map(|(_, closing)| *closing).collect();
                 let reached = Reached { nodes: &declared.nodes, stations: &declared.stations };

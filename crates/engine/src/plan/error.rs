@@ -246,7 +246,7 @@ pub enum PlanWarning {
         /// Index of the PDO.
         pdo: u16,
     },
-    /// A configuration file has no mailboxes, the SII has some: these are used.
+    /// A configuration file has no mailboxes, but the SII has some: the mailboxes of the SII are used.
     MailboxOfSii,
 }
 
@@ -379,7 +379,7 @@ impl fmt::Display for PlanWarning {
                 write!(f, "PDO {pdo:#06x}: the declared mapping differs from that of the SubDevice, which is fixed")
             }
             PlanWarning::MailboxOfSii => {
-                f.write_str("the file has no mailboxes, the SubDevice does: those of its SII are used")
+                f.write_str("the file has no mailboxes, but the SubDevice has some: the mailboxes of its SII are used")
             }
         }
     }

@@ -38,7 +38,7 @@ const PAUSE: Duration = Duration::from_millis(10);
 /// Limit until both ends of a link have detected that it went down or up, and frames have shown it. Interfaces need
 /// seconds to establish a link.
 const LINK_LIMIT: Duration = Duration::from_secs(5);
-/// The same for frames on a link with a carrier, if the ring may have been broken meanwhile.
+/// Limit until frames have shown a change of a link that has a carrier, if the ring may have been broken meanwhile.
 const FRAME_LIMIT: Duration = Duration::from_millis(200);
 /// Interval of the check for it.
 const LINK_PAUSE: Duration = Duration::from_millis(1);
@@ -101,7 +101,7 @@ pub(super) async fn cabling(
     found
 }
 
-/// Waits for a link that a procedure which was ended has taken down: a scan would find the ring open.
+/// Waits until a link is up again that an ended procedure had taken down: before that a scan would find the ring open.
 pub(crate) async fn until_link_returns(bus: &Bus, segment: &SharedSegment) {
     if !segment.view().is_link_returning() {
         return;
@@ -114,8 +114,8 @@ pub(crate) async fn until_link_returns(bus: &Bus, segment: &SharedSegment) {
     segment.observe(Observation::Link(LinkObservation::Connected));
 }
 
-/// Waits until no link is without a carrier, which would be reported as lost. The links are polled less often than
-/// frames arrive.
+/// Waits until all links have a carrier: a link without one would be reported as lost. The links are polled less often
+/// than frames arrive.
 async fn until_carriers(bus: &Bus) {
     let (until, signal) = (bus.now() + LINK_LIMIT, bus.signal());
     while bus.carriers().contains(&Some(false)) && bus.now() < until {

@@ -62,7 +62,7 @@ pub(crate) async fn deactivate(
     let until = bus.now() + limit;
     let Remainder { to_stop, known } = remainder;
     let declared = to_stop.clone();
-    // Neither a SubDevice that does not leave its state nor lost frames must take the time of the others.
+    // A SubDevice that does not leave its state, or lost frames, must not use up the time that the later steps need.
     let stopping = stop(bus, to_stop, AlState::PreOp, limit / 2);
     let stopped = bus.within(limit - limit / 4, stopping).await.unwrap_or(Err(StopError::NoAnswer));
     // A scan that loses frames must not take longer.

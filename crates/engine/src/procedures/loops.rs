@@ -86,9 +86,10 @@ pub(super) fn write_of((station, control): (StationAddress, DlControl)) -> (Comm
     (Command::Fpwr, Target::Station(station, map::DL_CONTROL), control.encode()[..WRITTEN].to_vec())
 }
 
-/// Closes ports for a moment, in one frame, carries out `work`, and restores what the model says. `before`: the present
-/// settings of their SubDevices ([`controls`]). `closing`: how long to wait then until a ring of two links shows to be
-/// closed again; without it the ring is not awaited. Returns an error, without `work`, if they could not be written.
+/// Closes ports for a moment, in one frame, carries out `work`, and restores the settings of the model. `before`: the
+/// present settings of their SubDevices ([`controls`]). `closing`: how long to wait afterwards until a ring of two
+/// links is seen closed again; `None` does not wait. Returns an error, without `work`, if the ports could not be
+/// closed.
 pub(super) async fn while_closed<T>(
     bus: &Bus,
     segment: &SharedSegment,
@@ -107,7 +108,7 @@ pub(super) async fn while_closed<T>(
     };
     let is_restored = restore(bus, segment).await;
     if let Some(limit) = closing {
-        // Settings that were not restored expire.
+        // Settings that could not be restored expire by themselves.
         until_ring_is_closed(bus, if is_restored { limit } else { CLOSING_LIMIT }).await;
     }
     result
@@ -128,7 +129,7 @@ pub(super) async fn controls(
         let Some(control) = read else { return Err(format!("the ports of station {station} are being written")) };
         let is_closed = |port: &u8| control.loops[usize::from(port & 3)] == LoopControl::Closed;
         if ports.iter().any(|(of, port)| *of == station && is_closed(port)) {
-            return Err(format!("a port of station {station} that would be closed for a moment is closed already"));
+            return Err(format!("a port of station {station} that has to be closed for a moment is already closed"));
         }
         controls.push((station, control));
     }

@@ -174,7 +174,7 @@ async fn find_places(bus: &Bus, segment: &SharedSegment) -> Option<Vec<(StationA
 
 /// Makes an unassigned SubDevice the member that it is, unless its address cannot be written now.
 async fn admit(bus: &Bus, segment: &SharedSegment, key: SubDeviceKey, (index, attempt): (usize, u32)) {
-    // Mail that has changed its PDOs counts: its mailbox closes.
+    // A mailbox message that has changed its PDOs is noted now: its mailbox is closed.
     let known = || {
         segment.observe_undeclared_pdos();
         segment.view().as_member(key, index)

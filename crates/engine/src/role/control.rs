@@ -13,8 +13,9 @@ use super::MainDeviceRole;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum RoleRequest {
-    /// It becomes ACTIVE with the next cycle, whatever the other MainDevice does. One that is ACTIVE stays it, and
-    /// withdraws an offer of its role that is under way, without an event; not after its last cycle has gone.
+    /// It becomes ACTIVE with the next cycle, whatever the other MainDevice does. A MainDevice that is ACTIVE stays
+    /// ACTIVE, and withdraws an offer of its role without an event, unless it has already sent its last cycle as
+    /// ACTIVE.
     Active,
     /// It becomes INACTIVE with the next cycle, whether or not the other MainDevice takes over.
     Inactive,

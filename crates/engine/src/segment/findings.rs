@@ -86,7 +86,7 @@ pub enum Oddity {
     },
     /// It is not there, and its PDOs are not declared.
     NoPlace,
-    /// It is the declared reference clock and has no clock.
+    /// The SubDevice is declared as the reference clock, but has no distributed clock.
     Reference {
         /// The position of the clock that takes its place.
         instead: Option<Position>,

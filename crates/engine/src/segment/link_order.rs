@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_link_returns_from_the_order_to_disconnect_it_until_it_is_up() {
+    fn a_disconnected_link_counts_as_returning_until_it_is_up() {
         for (seen, returns) in [
             (&[Ordered(DOWN)][..], false),
             (&[Ordered(DOWN), Fetched], true),

@@ -290,7 +290,7 @@ impl Segment {
         self.link_control.answer()
     }
 
-    /// Whether a link was disconnected on purpose, and is not known to be up again.
+    /// Whether an order has disconnected a link that is not known to be up again.
     pub fn is_link_returning(&self) -> bool {
         self.link_control.is_returning()
     }

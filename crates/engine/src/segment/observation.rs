@@ -47,7 +47,7 @@ pub enum StandbyObservation<'a> {
     TookOver {
         /// The members as the other MainDevice has seen them.
         lives: &'a [Life],
-        /// They are those of another MainDevice, not those that this one had when it was ACTIVE itself.
+        /// The states come from another MainDevice, not from the time when this MainDevice was ACTIVE.
         is_of_other: bool,
         /// They keep their configuration; otherwise they get it again from INIT on.
         is_hot: bool,

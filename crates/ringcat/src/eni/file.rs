@@ -134,7 +134,7 @@ impl EniFile {
     pub fn stated(&self) -> Vec<Stated> {
         let stated = |subdevice: &ringcat_config::eni::SubDevice| {
             let mut stated = Stated::default();
-            // The elements are required: 0 states nothing.
+            // The elements are required in an ENI: 0 means that the identity is not stated.
             let [vendor, product, revision] = [subdevice.vendor_id, subdevice.product_code, subdevice.revision]
                 .map(|number| number.filter(|number| *number != 0));
             stated.device = vendor.zip(product);

@@ -1,5 +1,5 @@
-//! An INACTIVE that waits for an ACTIVE raises an alarm when none is there: outputs then stand still, or their
-//! watchdogs have expired.
+//! An INACTIVE that waits for an ACTIVE raises an alarm if none sends process data: outputs then no longer change, or
+//! their watchdogs have expired.
 
 use std::time::Duration;
 
@@ -17,7 +17,7 @@ enum Alarm {
 /// Watches for an ACTIVE.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lookout {
-    /// When an ACTIVE was there last, or when this began.
+    /// Time of the last process data of an ACTIVE, or of the beginning of this watch.
     there_at: Instant,
     alarm: Alarm,
 }
@@ -32,7 +32,7 @@ impl Lookout {
         *self = Lookout::new(now);
     }
 
-    /// This MainDevice is INACTIVE. `seen_at`: when the ACTIVE was there last, if it was.
+    /// This MainDevice is INACTIVE. `seen_at`: time of the last process data of the ACTIVE, if there was any.
     pub fn note(&mut self, seen_at: Option<Instant>, limit: Duration, now: Instant) -> Option<CyclicStandbyEvent> {
         self.there_at = self.there_at.max(seen_at.unwrap_or_default());
         let silence = now.since(self.there_at);
@@ -58,7 +58,7 @@ mod tests {
 
     // covers: REQ032, 9.11, standby
     #[test]
-    fn each_silence_is_reported_once_and_its_end_too() {
+    fn a_missing_active_is_reported_once_and_its_return_too() {
         let mut lookout = Lookout::new(at(100));
         assert_eq!(lookout.note(None, LIMIT, at(114)), None);
         assert_eq!(lookout.note(None, LIMIT, at(115)), Some(CyclicStandbyEvent::NoActive(LIMIT)), "it never came");

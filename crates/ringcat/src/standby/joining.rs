@@ -71,7 +71,7 @@ impl Joining {
         self.decide(&partner, has_link, now)
     }
 
-    /// Whether an alarm is to be reported. One that becomes ACTIVE has time to do so.
+    /// Whether an alarm is to be reported. A MainDevice that may become ACTIVE gets time to do so first.
     pub(crate) fn look_out(&mut self, partner: &PartnerStatus, now: Instant) -> Option<CyclicStandbyEvent> {
         self.lookout.note(partner.at, self.limit.saturating_mul(if self.takes_over { 2 } else { 1 }), now)
     }

@@ -160,7 +160,8 @@ impl Watch {
         Watch { policy, time_out, own: main, dice, pause, lookout }
     }
 
-    /// Whether an alarm is to be reported in the cycle that begins now. One that takes over has time to do so.
+    /// Whether an alarm is to be reported in the cycle that begins now. A MainDevice that takes over gets time to do so
+    /// first.
     pub fn look_out(&mut self, situation: &Situation, now: Instant) -> Option<CyclicStandbyEvent> {
         if situation.role == MainDeviceRole::Active {
             self.lookout.is_active(now);

@@ -51,9 +51,9 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         }
     }
 
-    /// The SubDevices with outputs whose watchdog, as declared, is not longer than process data may be missing in a
-    /// takeover with this policy: its time, and how long it may be missing. They leave OP in a takeover. None if this
-    /// policy does not take over.
+    /// The SubDevices with outputs whose declared watchdog is not longer than the time for which process data may be
+    /// missing in a takeover with this policy: each with its watchdog, and with that time. They leave OP during a
+    /// takeover. None if this policy does not take over.
     ///
     /// # Errors
     /// The thread of the acyclic half has ended.

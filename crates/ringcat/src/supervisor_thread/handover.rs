@@ -13,8 +13,8 @@ use crate::error::Error;
 use crate::links::Links;
 use crate::main_device::Options;
 
-/// Longest wait of a hand-over until ports are open that were closed for a moment: their temporary settings have
-/// expired by then.
+/// Longest wait of a hand-over until temporarily closed ports are open again: their temporary settings have expired by
+/// then.
 const OPENED: Duration = Duration::from_secs(2);
 
 impl SupervisorThread {

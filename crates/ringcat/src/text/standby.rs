@@ -44,12 +44,12 @@ pub(super) fn describe(event: &Event, names: &Names) -> Option<String> {
             silence.as_secs_f64() * 1e3
         ),
         StandbyEvent::WatchdogTooShort { subdevice, watchdog, needed } => format!(
-            "{}: its watchdog of {:.1} ms is too short for a takeover, which may last {:.1} ms: it leaves OP in one",
+            "{}: its watchdog of {:.1} ms is too short: a takeover may last {:.1} ms, and the SubDevice then leaves OP",
             names.of(*subdevice),
             watchdog.as_secs_f64() * 1e3,
             needed.as_secs_f64() * 1e3
         ),
-        StandbyEvent::ActiveIsBack => "an ACTIVE is there again".to_owned(),
+        StandbyEvent::ActiveIsBack => "an ACTIVE sends process data again".to_owned(),
         StandbyEvent::RoleRefused(write) => {
             format!("the role does not change: {write}; a forced request would cut that off")
         }

@@ -20,17 +20,17 @@ use crate::world::station;
 
 /// Time in which idle operation has followed a change of the cables.
 const FOLLOWED: Duration = Duration::from_millis(2_500);
-/// Time in which nothing happens then.
+/// Time after that in which the cables do not change.
 const CALM: Duration = Duration::from_millis(500);
 
 /// Results of reports.
 #[derive(Clone, Debug, Default)]
 pub struct Reported {
-    /// Delays that were reported, and right.
+    /// Reported delays that are right.
     pub right: usize,
     /// SubDevices on the link of the first clock without a reported delay.
     pub missing: usize,
-    /// Of these those in reports after which no cable was cut, of segments in which all have a clock.
+    /// Missing delays in reports of segments without a cut cable in which all SubDevices have a clock.
     pub missing_when_whole: Vec<String>,
     /// Wrong delays, and SubDevices that are left with a closed port.
     pub wrong: Vec<String>,

@@ -40,7 +40,8 @@ fn verdict(text: &str) -> &str {
 // covers: standby, MR-01, MR-07, MR-21, MR-26, REQ005, REQ008, REQ012, REQ026
 #[test]
 fn the_script_of_two_controllers_holds_in_each_step_and_leaves_nothing() {
-    // Its namespaces are not used: no other test runs meanwhile, and none is here without root.
+    // The namespaces of the bench are not used: holding it keeps other tests from running meanwhile, and it is `None`
+    // without root.
     let Some(_alone) = Bench::new(0) else { return };
     let child = play();
     let process = child.id();

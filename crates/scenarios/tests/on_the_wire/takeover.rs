@@ -215,7 +215,8 @@ fn a_watchdog_that_is_too_short_for_a_takeover_ends_a_controller_that_is_strict(
     let declared =
         std::mem::replace(&mut pair.declared, ["--automatic", "--cycle", "10ms"].map(str::to_owned).to_vec());
     let (said, errors) = pair.first(&["--strict"]).finish(LIMIT);
-    let reason = "its watchdog of 100.0 ms is too short for a takeover, which may last 120.0 ms: it leaves OP in one";
+    let reason =
+        "its watchdog of 100.0 ms is too short: a takeover may last 120.0 ms, and the SubDevice then leaves OP";
     let last = said.lines().last().unwrap_or_default();
     assert!(last.starts_with("result: FAILED: ") && last.contains(reason), "{said}{errors}");
     pair.all_are_in("INIT");

@@ -171,7 +171,7 @@ fn a_subdevice_gone_before_a_takeover_is_missing_one_that_goes_with_it_is_lost()
 #[test]
 fn an_active_that_is_started_again_is_followed_at_once_by_the_one_that_stayed() {
     let mut two = Two::in_op(ring_of_two(8, Host::First), declare, standby());
-    // Its count of cycles is far from the first one.
+    // The cycle counter of the ACTIVE is far above its first value.
     two.run(Duration::from_secs(5));
     two.kill(0);
     two.run(10 * CYCLE);

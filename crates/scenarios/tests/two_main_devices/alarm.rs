@@ -1,4 +1,4 @@
-//! No ACTIVE is there: an INACTIVE that does not take over raises an alarm, once per silence.
+//! Without an ACTIVE, an INACTIVE that does not take over raises an alarm, once until an ACTIVE sends again.
 
 use std::time::Duration;
 
@@ -48,7 +48,7 @@ fn a_permanent_standby_raises_an_alarm_before_and_after_an_active() {
 
 // covers: standby, 9.11
 #[test]
-fn one_that_takes_over_raises_no_alarm() {
+fn an_inactive_that_takes_over_raises_no_alarm() {
     let mut pair = Pair::of_members(2, ring_of_two(3, Host::Second));
     pair.hosts().guard(Host::First, CYCLE);
     pair.kill(Host::First);
@@ -61,7 +61,7 @@ fn one_that_takes_over_raises_no_alarm() {
 
 // covers: standby, MR-10, 9.11
 #[test]
-fn of_two_that_both_yield_in_a_collision_one_is_active_again_after_its_pause() {
+fn after_a_collision_in_which_both_yield_one_is_active_again_after_its_pause() {
     for seed in 0..8 {
         let mut pair = Pair::without_programs(seed, ring_of_two(3, Host::First));
         pair.start_yielding_member(Host::First);

@@ -90,7 +90,7 @@ fn states_of_an_inactive_are_unknown_as_long_as_no_active_reports_them() {
     assert_eq!((inactive.states(), online().count()), (vec![SubDeviceState::Unknown; 8], 0), "{}", two.log());
     assert_eq!((inactive.unsettled().len(), inactive.all_settled()), (8, false));
     assert_eq!(live.segment().responding, 0);
-    // What was reported is still what it goes on with.
+    // For a takeover the INACTIVE still has the last reported states.
     two.controllers[1].request(RoleRequest::Active);
     two.run(20 * CYCLE);
     assert!(two.controllers[1].engine.all_settled() && two.left_op.is_empty(), "{}", two.log());

@@ -1,4 +1,4 @@
-//! A takeover lasts longer than a watchdog: that is known when the policy is set, and named.
+//! Watchdogs that are shorter than a takeover are reported when the policy is set.
 
 use std::sync::mpsc;
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! Frames of a cycle with a standby, against the time that they have.
+//! The time that the frames of a cycle take on the wire with a standby, compared with the period.
 
 use std::sync::mpsc;
 use std::time::Duration;
@@ -42,10 +42,10 @@ fn a_cycle_that_cannot_hold_its_frames_is_refused_with_the_time_they_take() {
     for count in [2, 10, 33] {
         for acyclic in [0, 4] {
             let options = StandbyOptions::default().with_max_acyclic(acyclic);
-            let time = needed(count, Duration::from_micros(100), options.clone()).expect("it does not fit");
+            let time = needed(count, Duration::from_micros(100), options).expect("it does not fit");
             println!("{count} SubDevices, {acyclic} acyclic frames: {time:?}");
             let just = Duration::from_micros(time.as_nanos().div_ceil(1_000) as u64);
-            assert_eq!(needed(count, just, options.clone()), None, "{count}, {just:?}");
+            assert_eq!(needed(count, just, options), None, "{count}, {just:?}");
             let less = just - Duration::from_micros(1);
             assert_eq!(needed(count, less, options), Some(time), "{count}, {less:?}");
         }

@@ -94,8 +94,8 @@ fn process_data_that_an_eni_leaves_out_prevents_op() {
     });
     let differences = of_eni(&exported(&file), "servo");
     assert_eq!(kinds(&differences), [(Mailbox, false), (Pdos, true), (Pdos, true)]);
-    let text = "position 0 \"servo (1001)\": SM 2: PDO 0x1600 is assigned, but not in the file; expected a length of 0, \
-                got 12: the file has no process data for it";
+    let text = "position 0 \"servo (1001)\": SM 2: PDO 0x1600 is assigned, but not in the file; expected a length of \
+                0, got 12: the file has no process data for it";
     assert_eq!(differences[1].text, text);
     // One of two SyncManagers.
     let file = file_of("servo", |file| drop(file.subdevice[0].sync_manager.pop()));

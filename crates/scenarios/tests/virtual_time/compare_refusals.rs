@@ -199,7 +199,7 @@ fn the_reference_of_an_eni_without_a_clock_is_named() {
 
 // covers: network-file
 #[test]
-fn a_ring_that_is_a_line_is_a_difference_that_prevents_op() {
+fn a_declared_ring_that_is_a_line_is_a_difference_that_prevents_op() {
     let network = file_of(LINE, |file| file.redundancy.ring = true);
     let (_, scan) = scanned(LINE, &Options::default());
     let line = FoundNetwork::new(&scan.subdevices, &scan.topology);
@@ -337,7 +337,7 @@ fn modules_in_slots_that_are_not_those_of_the_file_prevent_op() {
 /// The bits of a control byte besides mode and direction do not prevent OP; those of a mailbox do.
 // covers: network-file, eni-run
 #[test]
-fn control_bytes_of_an_eni_are_named_as_a_whole() {
+fn all_bits_of_control_bytes_of_an_eni_are_compared() {
     let export = file_of(LINE, |_| ()).file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
     let of = |changes: &[(&str, &str)]| {
         let text = changes.iter().fold(export.text.clone(), |text, (from, to)| {

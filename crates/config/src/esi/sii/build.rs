@@ -1,6 +1,8 @@
 //! An image from a description: the fixed area, the categories in their order, the end (protocol ES-80 to ES-85,
 //! ES-100).
 
+use std::collections::BTreeMap;
+
 use ringcat_wire::sii::{Identity, MailboxLayout, MailboxProtocols, SiiHeader};
 
 use super::categories::Builder;
@@ -124,9 +126,16 @@ fn whole(data: &[u8], options: &SiiOptions) -> Option<SiiImage> {
 
 /// Categories given by the description. They replace generated categories if their length is right (protocol ES-100).
 fn own_categories(eeprom: &Eeprom, categories: &mut Vec<(u16, Vec<u8>)>, notices: &mut Vec<String>) {
+    let mut places = BTreeMap::new();
+    for (place, (number, _)) in categories.iter().enumerate().filter(|(_, (_, made))| !made.is_empty()) {
+        places.entry(*number).or_insert(place);
+    }
     for own in &eeprom.categories {
         let data = own.content.bytes();
-        let Some(made) = categories.iter_mut().find(|(code, made)| *code == own.number && !made.is_empty()) else {
+        let Some(made) = places.get(&own.number).and_then(|place| categories.get_mut(*place)) else {
+            if !data.is_empty() {
+                places.insert(own.number, categories.len());
+            }
             categories.push((own.number, data));
             continue;
         };

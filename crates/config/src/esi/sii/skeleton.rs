@@ -218,7 +218,7 @@ fn fmmus_and_sync_managers(out: &mut Xml, sii: &Sii<'_>) -> fmt::Result {
         ))?;
     }
     let units: Vec<u8> = sii.categories().filter(|it| it.kind.code() == 43).flat_map(|it| it.data).copied().collect();
-    // What follows the last one may be padding.
+    // Bytes after the last such unit may be padding.
     let count = units.iter().rposition(|unit| *unit == FRAME_REPEAT).map_or(0, |last| last + 1);
     for unit in &units[..count] {
         out.line(format_args!("<Su{}/>", if *unit == FRAME_REPEAT { " FrameRepeatSupport=\"1\"" } else { "" }))?;

@@ -159,7 +159,7 @@ impl State {
         let (request, is_forced) = self.control.take_request()?;
         let is_offered = self.role == MainDeviceRole::Active && self.frames.header.phase != Phase::Goes;
         if is_offered && request == RoleRequest::HandOver {
-            // It is under way; it may be forced now.
+            // The hand-over is under way; this request may force it.
             self.is_forced |= is_forced;
             return None;
         }

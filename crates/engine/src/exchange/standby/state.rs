@@ -40,9 +40,9 @@ pub struct StandbySetup {
 /// Whether the role may be offered to the other MainDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::exchange) enum Offers {
-    /// It may.
+    /// The role may be offered.
     Possible,
-    /// Not any more: the application ends, and acts on the SubDevices as ACTIVE afterwards.
+    /// The role is no longer offered: the application ends, and afterwards stops the SubDevices as ACTIVE.
     Ended,
 }
 

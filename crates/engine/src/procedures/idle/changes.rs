@@ -76,7 +76,7 @@ pub(crate) async fn scan_again(
         bus.brd(map::DL_STATUS, DlStatus::LEN).await?;
         let read: Vec<(StationAddress, DlStatus)> = infos.iter().map(|info| (info.station, info.dl_status)).collect();
         if !are_ports_as_before(bus, &read).await? {
-            // A port that flaps must not keep what is new from being followed.
+            // A port that goes up and down repeatedly must not prevent a scan of new SubDevices.
             segment.observe_idle(IdleObservation::RescanAsked);
         }
     }

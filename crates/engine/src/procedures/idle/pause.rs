@@ -13,8 +13,8 @@ use crate::supervisor::Bus;
 /// Maximum wait for other procedures that need the ports, and for one of idle operation that works on the segment.
 const LIMIT: Duration = Duration::from_secs(5);
 
-/// Carries out work that closes ports for a moment, to its end also if the caller no longer waits. Broadcasts would
-/// show another segment meanwhile. `None` if it cannot be done now, or a scan has begun meanwhile.
+/// Carries out work that closes ports for a moment; it is completed also if the caller no longer waits. Broadcasts
+/// pause meanwhile: fewer SubDevices would answer them. `None` if it cannot be done now, or a scan has begun meanwhile.
 pub(crate) async fn without_watch<T: 'static>(
     bus: &Bus,
     segment: &SharedSegment,
@@ -23,7 +23,8 @@ pub(crate) async fn without_watch<T: 'static>(
     let (ended, result) = (bus.signal(), Rc::new(RefCell::new(None)));
     let (own_bus, own_segment, own_ended, own_result) = (bus.clone(), segment.clone(), ended.clone(), result.clone());
     bus.spawn(async move {
-        // Work that has begun has to end; a caller that has given up does not need it before.
+        // Work that has begun must be completed; work that has not begun is not started for a caller that no longer
+        // waits.
         let is_wanted = || Rc::strong_count(&own_result) > 1;
         let done = paused(&own_bus, &own_segment, is_wanted, work).await;
         *own_result.borrow_mut() = Some(done);

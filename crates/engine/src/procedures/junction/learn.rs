@@ -138,7 +138,7 @@ pub(super) async fn with_closed(
     for (station, _) in &ports {
         before.push((*station, lasting(bus, *station).await?));
     }
-    // A scan or a stop that begins meanwhile restores them.
+    // The model keeps the settings: a scan or a stop that begins meanwhile restores them.
     segment.observe(Observation::PortsAltered(&before));
     let close = ports.iter().zip(&before).map(|((station, port), (_, control))| (*station, closed(*control, *port)));
     let result = match write(bus, close.collect()).await {

@@ -15,7 +15,7 @@ use crate::ring::RingState;
 use crate::segment::{IdleObservation, Observation, Segment};
 use crate::supervisor::Bus;
 
-/// Maximum wait until an opened ring of two links shows to be closed again: broadcasts pause meanwhile, and a ring that
+/// Maximum wait until an opened ring of two links is seen closed again: broadcasts pause meanwhile, and a ring that
 /// broke has to be noticed soon.
 const CLOSING: Duration = Duration::from_millis(50);
 
@@ -29,7 +29,8 @@ pub(super) struct Rings {
 }
 
 /// Closes the ports at the ends of rings, carries out `open`, opens the ports again and carries out `whole`, also if
-/// the caller no longer waits. `None` if that cannot be done now, or the segment is not, or no longer, that of the last scan.
+/// the caller no longer waits. `None` if that cannot be done now, or if the segment differs from the last scan before
+/// or afterwards.
 pub(super) async fn while_open<T: 'static, U: 'static>(
     bus: &Bus,
     segment: &SharedSegment,
@@ -40,7 +41,7 @@ pub(super) async fn while_open<T: 'static, U: 'static>(
     let (own_bus, own_segment) = (bus.clone(), segment.clone());
     let work = async move {
         let (bus, segment) = (own_bus, own_segment);
-        // Idle operation may have found another segment before its work had ended.
+        // Idle operation may have found a changed segment before it paused.
         let stations = |segment: &Segment| segment.found().map(|found| found.stations());
         let are_same =
             stations(&segment.view()).is_some_and(|now| now.iter().eq(rings.status.iter().map(|(at, _)| at)));
@@ -49,7 +50,7 @@ pub(super) async fn while_open<T: 'static, U: 'static>(
         }
         let opened = close_ports(&bus, &segment, &rings.ports, open).await;
         let closed = whole.await;
-        // Otherwise idle operation would scan again because of the ports, and examine the rings.
+        // Otherwise the events of these ports would cause another scan and another examination of the rings.
         let is_cleared = bus.brd(map::DL_STATUS, DlStatus::LEN).await.is_ok();
         let is_as_before = is_as_scanned(&bus, &segment, &rings.status).await;
         Some((opened?, closed)).filter(|_| is_cleared && is_as_before)

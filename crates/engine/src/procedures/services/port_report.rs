@@ -144,7 +144,7 @@ impl Known {
         Some(Known { stations, topology, kinds, has_clock, names, scanned: scanned.unwrap_or_default(), delays })
     }
 
-    /// Delays from the first clock. `cables`: times of cables; those that these frames show are added.
+    /// Delays from the first clock. `cables`: known delays of cables; the delays that these frames show are added.
     fn propagation(&self, wiring: &Wiring, samples: Vec<Sample>, cables: &mut Cables) -> Option<Vec<Option<i64>>> {
         let reference = self.has_clock.iter().position(|clock| *clock)?;
         let mut measurements = Measurements::new(wiring);

@@ -45,7 +45,7 @@ impl UndeclaredMailboxes {
     }
 
     /// The SubDevices with mailboxes from now on. Mailboxes of those that stay do not change, the others are closed:
-    /// returned are those of them with downloads to objects of PDO assignment or mapping that were not taken.
+    /// the result has those with downloads to PDO assignment or mapping that were not fetched.
     pub(crate) fn follow(&self, now: &[(SubDeviceKey, Position)]) -> Vec<SubDeviceKey> {
         let (mut all, mut rings) = (self.all.borrow_mut(), self.rings.borrow_mut());
         let is_same =

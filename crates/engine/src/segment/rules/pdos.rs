@@ -45,8 +45,8 @@ impl Segment {
         self.tell_scan(&before, &now);
     }
 
-    /// What is known now of the PDOs of a SubDevice counts in the last scan, too. Where the list and the last scan
-    /// share their data they do so afterwards.
+    /// Copies what is known now of the PDOs of a SubDevice to the last scan. If the list and the last scan share their
+    /// data, they share it afterwards as well.
     fn tell_scan(&mut self, before: &Rc<SubDeviceInfo>, now: &Rc<SubDeviceInfo>) {
         let Some(scanned) = self.stage.scanned_mut() else { return };
         let is_it = |it: &Rc<SubDeviceInfo>| it.station == now.station && it.identity == now.identity;
@@ -69,8 +69,8 @@ impl Segment {
         }
     }
 
-    /// A SubDevice that has left the list has got mail that has changed its PDOs. It may come back with its station
-    /// address, and with what the last scan knows of it.
+    /// A mailbox message has changed the PDOs of a SubDevice that has left the list. The SubDevice may come back with
+    /// the same station address, and then the last scan describes it.
     fn doubt_scanned(&mut self, station: StationAddress) {
         let Some(scanned) = self.stage.scanned_mut() else { return };
         if let Some(at) = scanned.found.subdevices.iter().position(|it| it.station == station) {

@@ -56,8 +56,8 @@ impl Segment {
         self.attention.want();
     }
 
-    /// Members that did not answer to the other MainDevice are reported here as well (protocol MR-23): its events are
-    /// not known to this application.
+    /// Members that did not answer to the other MainDevice are reported here as well (protocol MR-23): the application
+    /// here has not got the events of the other MainDevice.
     fn report_missing(&self, lives: &[Life], effects: &mut Effects) {
         for (index, _) in lives.iter().enumerate().filter(|(_, life)| life.presence == Presence::Offline) {
             let Some(member) = self.member(index) else { return };

@@ -184,7 +184,7 @@ fn an_unassigned_subdevice_that_has_left_is_not_admitted() {
     assert_eq!((effects, ring.member(0).phase), (Vec::new(), Phase::Absent));
 }
 
-/// It was out of reach: another program may have written its dictionary.
+/// A member that was out of reach: another program may have written its dictionary.
 #[test]
 fn pdos_of_an_admitted_or_read_member_are_in_doubt_in_the_last_scan_too() {
     let in_doubt = SubDeviceInfo { pdo_source: PdoSource::Outdated, ..info(0, station(0)) };

@@ -175,7 +175,7 @@ fn connections_are_checked_at_the_addresses_that_subdevices_have() {
 const NO_RING: [(Endpoint, Endpoint); 5] =
     [(MAIN, at(0, A)), (at(0, D), at(1, A)), (at(1, B), at(2, A)), (at(0, B), at(3, A)), (at(3, B), at(4, A))];
 
-/// A wrong connection over [`NO_RING`], loaded while the last SubDevice, of a slow EEPROM, is read after it was added.
+/// A wrong connection in [`NO_RING`], loaded while the last SubDevice, which was added and has a slow EEPROM, is read.
 fn loaded_while_reading(busy: Duration) -> MainDevice<Tap> {
     let mut described = descriptions(&["junction", "digital-output-8", "servo", "digital-input-8", "digital-input-8"]);
     described[4].sii_busy = busy;

@@ -1,5 +1,5 @@
-//! What an image has and an image made of its description has not, whichever tool makes it: fields without a place in a
-//! description.
+//! Fields of an image that have no place in a description: an image that any tool makes of the description does not
+//! have them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -32,7 +32,7 @@ pub(super) fn notices(image: &[u8], sii: &Sii<'_>, text: &str) -> Vec<String> {
     notices.extend(repeated(sii));
     let lost = match read("description", text.as_bytes()).and_then(|esi| lost(image, &esi)) {
         Ok(lost) => lost,
-        // Such as PDOs beyond the size that the image states.
+        // For example, PDOs can lie beyond the size that the image states.
         Err(error) => {
             notices.push(format!("no image can be made of the description: {error}"));
             return notices;
@@ -82,7 +82,7 @@ fn lost(image: &[u8], esi: &Esi) -> Result<Vec<FieldDifference>, EsiError> {
 /// Whether it is a field of the image that a description could have.
 fn is_of_image(difference: &FieldDifference) -> bool {
     let FieldDifference { field, expected, is_individual, .. } = difference;
-    // What follows the last FMMU that is used may be padding.
+    // Bytes after the last used FMMU may be padding.
     let is_no_fmmu = field.starts_with("fmmu ") && ["0x00", "0xff"].contains(&expected.as_str());
     !is_individual && !expected.is_empty() && !is_no_fmmu && !ASIDE.contains(&field.as_str())
 }
@@ -90,7 +90,7 @@ fn is_of_image(difference: &FieldDifference) -> bool {
 fn notice(lost: &FieldDifference) -> String {
     let FieldDifference { field, expected, got, .. } = lost;
     if field.starts_with("string ") {
-        return format!("{field}: nothing refers to it, it has no place in a description");
+        return format!("{field}: nothing refers to it, so it has no place in a description");
     }
     let got = if got.is_empty() { "none" } else { got };
     format!("{field}: {expected} has no place in a description; an image made of it has {got}")
@@ -99,17 +99,22 @@ fn notice(lost: &FieldDifference) -> String {
 /// An image says that a PDO has several samples, not how many.
 fn samples(sii: &Sii<'_>) -> Vec<String> {
     let pdos = [PdoDirection::Rx, PdoDirection::Tx].into_iter().flat_map(|direction| sii.pdos(direction));
-    let of =
-        |pdo: Pdo<'_>| format!("PDO {:#06x} has several samples: OSFac is 1, the image does not have it", pdo.index);
+    let of = |pdo: Pdo<'_>| {
+        format!("PDO {:#06x} has several samples: OSFac is 1, the image does not have the factor", pdo.index)
+    };
     pdos.filter(|pdo| pdo.flags & Pdo::OVERSAMPLING != 0).take(LISTED).map(of).collect()
 }
 
-/// Categories of the vendor that are there several times.
+/// Categories of the vendor that occur more than once.
 fn repeated(sii: &Sii<'_>) -> Vec<String> {
     let mut counts: BTreeMap<u16, usize> = BTreeMap::new();
     for code in sii.categories().map(|it| it.kind.code()).filter(|code| !GENERATED.contains(code)) {
         *counts.entry(code).or_default() += 1;
     }
     let repeated = counts.into_iter().filter(|(_, count)| *count > 1).take(LISTED);
-    repeated.map(|(code, count)| format!("category {code} is there {count} times: an image has the last one")).collect()
+    repeated
+        .map(|(code, count)| {
+            format!("category {code} occurs {count} times: the description gives back only the last one")
+        })
+        .collect()
 }

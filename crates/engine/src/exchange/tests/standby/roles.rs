@@ -175,7 +175,7 @@ fn a_takeover_before_the_first_cycle_as_inactive_has_the_states_of_the_other_one
 
 // covers: MR-18, MR-26, standby
 #[test]
-fn an_active_that_begins_anew_is_followed_at_once_without_what_was_before() {
+fn an_active_that_starts_again_is_followed_at_once_without_data_from_before() {
     let mut duo = duo();
     (0..40).for_each(|_| duo.cycle());
     duo.first = Device::new(0x10, MainDeviceRole::Active, sizes(), (7, &[1]));
@@ -186,7 +186,7 @@ fn an_active_that_begins_anew_is_followed_at_once_without_what_was_before() {
     assert!(!duo.second.board.is_silent() && duo.first.exchange.partner().is_ready());
     let whole = duo.second.exchange.standby.0.as_ref().and_then(|state| state.following.whole());
     assert!(whole.is_some_and(|whole| whole.cycle <= 4), "of the count that began anew");
-    // Once more, in another session: the registers are not those of the one before.
+    // The ACTIVE starts again, in another session: its registers are not those of the previous session.
     (0..30).for_each(|_| duo.cycle());
     duo.first = Device::new(0x10, MainDeviceRole::Active, sizes(), (7, &[1]));
     duo.first.exchange.standby.0.as_mut().expect("it is one of two").frames.header.session = 5;

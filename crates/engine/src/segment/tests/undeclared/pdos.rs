@@ -106,7 +106,7 @@ fn a_dictionary_that_cannot_be_read_is_tried_again_with_the_next_attempt() {
 
 /// It may come back with its station address, and with what the last scan knows of it.
 #[test]
-fn mail_that_wrote_pdos_of_a_subdevice_that_has_left_counts_in_the_last_scan() {
+fn pdos_written_by_mail_before_a_subdevice_left_are_noted_in_the_last_scan() {
     let source = |idle: &Idle| idle.segment.found().unwrap().subdevices[1].pdo_source;
     for leaves_during_scan in [false, true] {
         let mut idle = with_dictionary(PdoSource::Dictionary);
