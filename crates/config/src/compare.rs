@@ -19,6 +19,7 @@ mod process_data;
 mod properties;
 mod replugged;
 mod unlisted;
+mod written;
 
 use std::collections::BTreeSet;
 

@@ -1,11 +1,12 @@
-//! Networks of files on buses that were changed at random, with SYNC signals and modules in slots: `compare` marks a
-//! difference that prevents OP exactly if the network does not reach OP there, by the network file and by its ENI.
+//! Networks of files on buses that were changed at random, with SYNC signals, modules in slots, and process data that
+//! is left to the EEPROM or assigned by start-up commands: `compare` marks a difference that prevents OP exactly if the
+//! network does not reach OP there, by the network file and by its ENI.
 
 use std::path::Path;
 use std::time::Duration;
 
 use ringcat::config::network::Bytes;
-use ringcat::config::network::model::{Clocks, Required, Sdo, Startup};
+use ringcat::config::network::model::{Clocks, Required, Sdo, Startup, SyncManager};
 use ringcat::config::{Configuration, Difference, ExportOptions, FoundNetwork, Stated};
 use ringcat::eni::EniFile;
 use ringcat::esi::EsiDevices;
@@ -20,10 +21,11 @@ use scenarios::seeds;
 const PERIOD: Duration = Duration::from_millis(1);
 const LIMIT: Duration = Duration::from_secs(5);
 const FILES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../config/tests/files");
-const TYPES: [&str; 7] = [
+const TYPES: [&str; 8] = [
     "coupler",
     "digital-output-8",
     "digital-input-8",
+    "emulated-output-8",
     "analog-input-4",
     "servo",
     "AM01\"\nesi = \"acme.xml\"\nmodules = [\"0x00010001\"]\n#",
@@ -150,6 +152,38 @@ fn synchronize(file: &mut NetworkFile, (scan, units): (&Scan, &[Unit]), dice: &m
     }
 }
 
+/// Leaves process data to the EEPROM, maps more, or writes the assignment with start-up commands.
+fn vary(file: &mut NetworkFile, units: &[Unit], dice: &mut Dice) {
+    let simple = |(_, unit): &(_, &Unit)| !unit.is_modular();
+    for (it, _) in file.subdevice.iter_mut().zip(units).filter(simple) {
+        match dice.below(12) {
+            0 => it.sync_manager.clear(),
+            1 => drop(it.sync_manager.pop()),
+            // A SubDevice that permits other mappings may refuse this one.
+            2 if it.mailbox.as_ref().is_none_or(|mailbox| !mailbox.pdo_config) => {
+                let entries = it.sync_manager.iter_mut().flat_map(|sm| &mut sm.pdo).flat_map(|pdo| &mut pdo.entries);
+                entries.flatten().take(1).for_each(|entry| entry.bits += 8);
+            }
+            _ => {}
+        }
+        if it.mailbox.is_some() && dice.one_in(4) {
+            let assigned = it.sync_manager.iter().filter(|sm| !sm.pdo.is_empty());
+            it.startup = assigned.flat_map(|sm| assignment(sm, dice.one_in(8))).collect();
+        }
+    }
+}
+
+/// Commands that assign the PDOs of a SyncManager, or none.
+fn assignment(of: &SyncManager, is_cleared: bool) -> Vec<Startup> {
+    let write = |sub: u8, data: &[u8]| {
+        let sdo = Sdo { index: 0x1C10 + u16::from(of.number), sub, data: Bytes(data.to_vec()), complete: false };
+        Startup { sdo: Some(sdo), ..Startup::default() }
+    };
+    let entries = (1..).zip(&of.pdo).map(|(sub, pdo)| write(sub, &pdo.index.to_le_bytes()));
+    let count = if is_cleared { 0 } else { of.pdo.len() as u8 };
+    std::iter::once(write(0, &[0])).chain(entries).chain([write(0, &[count])]).collect()
+}
+
 // covers: network-file, eni-run
 #[test]
 fn differences_are_marked_exactly_if_a_changed_bus_does_not_reach_op() {
@@ -168,11 +202,14 @@ fn differences_are_marked_exactly_if_a_changed_bus_does_not_reach_op() {
         (options.by_alias, options.check_serial) = (has_aliases, has_serials);
         let mut file = NetworkFile::from_scan(&scan.subdevices, &scan.topology, &options);
         synchronize(&mut file, (&scan, &units), &mut dice);
+        let plain = file.clone();
+        vary(&mut file, &units, &mut dice);
         let mut eni = file.to_eni(&ExportOptions::default()).ok();
         // Clocks without a reference and SYNC signals cannot be exported.
         assert!(eni.is_some() || has_aliases || file.clocks.is_some(), "seed {seed}");
         if eni.is_none() || dice.one_in(2) {
             eni = None;
+            file.subdevice = plain.subdevice;
             // Of two equal SubDevices the engine may take the other one as absent: then the modules of the remaining
             // one differ.
             for (it, unit) in file.subdevice.iter_mut().zip(&units) {

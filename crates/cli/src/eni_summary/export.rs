@@ -6,7 +6,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use ringcat::config::{self, Export, ExportDetails, ExportError, ExportOptions, LrwUse, export};
+use ringcat::config::{self, Export, ExportDetails, ExportError, ExportOptions, LrwUse, SubDeviceFacts, export};
 use ringcat::eni::EniFile;
 use ringcat::network::LoadedNetwork;
 
@@ -28,6 +28,10 @@ The ENI has every command that a MainDevice sends to bring the network to OP.
 It is read again before it is written: what an ENI cannot express is refused
 with the SubDevice and the reason, or listed as a warning where the network
 reaches OP without it. docs/eni.md has the list.
+
+An ENI leaves no process data to the EEPROM. A warning names the SubDevices for
+which the network file has no tables `sync_manager`: the ENI has no process data
+of them, and one that has some does not reach SAFEOP with it.
 
   ringcat init --main eth1 --out machine.toml
   ringcat eni export --network machine.toml --out machine.eni.xml
@@ -77,7 +81,11 @@ impl From<Lrw> for LrwUse {
 
 /// A line per setting and reason, in the order of their first SubDevices: hundreds of equal lines would hide the
 /// others.
-fn in_groups(left_out: &[config::LeftOut]) -> Vec<String> {
+fn in_groups(left_out: &[config::LeftOut], subdevices: &[SubDeviceFacts]) -> Vec<String> {
+    let named = |index: usize| match subdevices.get(index) {
+        Some(facts) => format!("{index} \"{}\"", facts.name.escape_debug()),
+        None => index.to_string(),
+    };
     let mut groups: Vec<(&config::LeftOut, Vec<String>)> = Vec::new();
     let mut known: HashMap<(&str, &str), usize> = HashMap::new();
     for it in left_out {
@@ -85,10 +93,13 @@ fn in_groups(left_out: &[config::LeftOut]) -> Vec<String> {
             groups.push((it, Vec::new()));
             groups.len() - 1
         });
-        groups[group].1.extend(it.subdevice.map(|index| index.to_string()));
+        groups[group].1.extend(it.subdevice.map(named));
     }
     let line = |(first, subdevices): (&config::LeftOut, Vec<String>)| {
-        if subdevices.len() < 2 {
+        if let [one] = &subdevices[..] {
+            return format!("SubDevice {one}: {}: {}", first.what, first.reason);
+        }
+        if subdevices.is_empty() {
             return first.to_string();
         }
         let more = if subdevices.len() > LISTED { ", ..." } else { "" };
@@ -109,7 +120,8 @@ pub fn run(arguments: &ExportArguments) -> Result<Report, Failure> {
         return Err(Failure::new(format!("{} exists: name another file, or add --overwrite", out.display())));
     }
     let export = made(arguments)?;
-    in_groups(&export.left_out).iter().for_each(|line| warn(format!("not in the ENI: {line}")));
+    let subdevices = &export.configuration.subdevices;
+    in_groups(&export.left_out, subdevices).iter().for_each(|line| warn(format!("not in the ENI: {line}")));
     if is_standard {
         output::write_file(&export.text);
     } else {

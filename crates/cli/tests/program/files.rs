@@ -440,5 +440,18 @@ fn settings_that_an_eni_does_not_hold_are_listed_once_for_all_subdevices() {
     let lines: Vec<&str> = all.lines().filter(|line| line.contains("not in the ENI: ")).collect();
     assert_eq!(lines.len(), 1, "{all}");
     // The name of the first one is its order code.
-    assert!(lines[0].contains("29 SubDevices (1, 2, 3, 4, 5, 6, 7, 8, ...): order_code: "), "{all}");
+    let named =
+        (1..=8).map(|index| format!("{index} \"digital-output-8 {}\"", index + 1)).collect::<Vec<_>>().join(", ");
+    assert!(lines[0].contains(&format!("29 SubDevices ({named}, ...): order_code: ")), "{all}");
+    // Process data that the file leaves to the EEPROM.
+    let text = std::fs::read_to_string(&out).expect("it was written");
+    let of_simple = |part: &str| !part.starts_with("subdevice.sync_manager");
+    let parts: Vec<&str> = text.split("[[").filter(|part| of_simple(part)).collect();
+    let without = place.write("without.toml", &parts.join("[["));
+    let exported = ringcat(&["eni", "export", "--network", &without, "--out", &place.path("without.xml")]);
+    assert_eq!(exported.code, Some(0), "{}", exported.all());
+    let all = exported.all();
+    let lines: Vec<&str> = all.lines().filter(|line| line.contains("sync_manager: ")).collect();
+    assert_eq!(lines.len(), 1, "{all}");
+    assert!(lines[0].contains("30 SubDevices (0 \"digital-output-8\", 1 \"digital-output-8 2\""), "{all}");
 }

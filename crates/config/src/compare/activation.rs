@@ -1,6 +1,7 @@
 //! What an activation refuses besides places, identities and process data of single SubDevices: clocks, rings, domains,
 //! LRW. The checks are those of the engine.
 
+use ringcat_engine::config::ReferenceClock;
 use ringcat_engine::declared::SubDeviceId;
 use ringcat_engine::link::LinkSet;
 use ringcat_engine::main_device::{ActivateError, obstacles, replaced_reference};
@@ -38,10 +39,18 @@ pub(super) fn differences(
         let text = "the file declares a ring (redundancy.ring), but the network is a line: there is no redundant link";
         add(None, DifferenceKind::Ring, true, text.to_owned());
     }
-    for error in obstacles(&declaration, (*junctions, connections), network.subdevices, links) {
+    let found = obstacles(&declaration, (*junctions, connections), network.subdevices, links);
+    let is_without_clock = found.iter().any(|error| matches!(error, ActivateError::NoClock { .. }));
+    for error in found {
         let text = error.to_string();
         let own = error.subdevice().and_then(|subdevice| text.strip_prefix(&format!("SubDevice {subdevice}: ")));
         add(error.subdevice().filter(|_| own.is_some()), kind(&error), true, own.unwrap_or(&text).to_owned());
+    }
+    if declaration.explicit_lrw.len() < configuration.declaration.explicit_lrw.len() {
+        let all = obstacles(&configuration.declaration, (*junctions, connections), network.subdevices, links);
+        if let Some(error) = all.iter().find(|error| matches!(error, ActivateError::NamedLrwOnTwoLinks(_))) {
+            add(None, DifferenceKind::Ring, false, format!("{error} (option --split-lrw)"));
+        }
     }
     if let Some(error) = network.not_closed {
         add(None, DifferenceKind::Ring, true, error.to_string());
@@ -53,6 +62,12 @@ pub(super) fn differences(
         };
         let text = format!("it is the reference clock of the file, but has no distributed clock: {other}");
         add(Some(subdevice), DifferenceKind::Clocks, false, text);
+    }
+    let has_clock = network.subdevices.iter().any(|info| info.controller.features.dc);
+    let clocks = declaration.clocks.as_ref().map(|clocks| clocks.reference);
+    if clocks.is_some_and(|it| !matches!(it, ReferenceClock::Declared(_))) && !has_clock && !is_without_clock {
+        let text = "the file declares distributed clocks (clocks), but no SubDevice has one";
+        add(None, DifferenceKind::Clocks, false, text.to_owned());
     }
     differences
 }

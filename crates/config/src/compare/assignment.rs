@@ -1,7 +1,7 @@
 //! The PDOs that a SubDevice assigns to its SyncManagers by its SII, compared with those that a file assigns.
 //!
-//! The MainDevice writes the assignment where it can (protocol 5.2). A file that says nothing leaves it to the
-//! SubDevice: that is no difference.
+//! The MainDevice writes the assignment where it can (protocol 5.2). A network file that says nothing leaves it to the
+//! SubDevice: that is no difference. Process data that an ENI does not have is not set up.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::plan;
 use ringcat_wire::sii::Pdo;
 
-use super::process_data;
+use super::written;
 
 /// Objects with the modules that are configured and detected (ETG.5001.1).
 const MODULES: [u16; 2] = [0xF030, 0xF050];
@@ -30,14 +30,14 @@ pub(super) fn names_modules(declared: &SubDeviceConfig) -> bool {
 /// of its own.
 pub(super) fn differences(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> Vec<(u8, String)> {
     let wanted = wanted(declared);
-    let is_silent = wanted.values().all(|pdos| pdos.as_ref().is_none_or(Vec::is_empty)) && declared.declared.is_some();
-    if info.pdos.is_empty() || wanted.is_empty() || is_silent {
+    let is_silent = wanted.is_empty() && declared.declared.is_none();
+    if info.pdos.is_empty() || is_silent {
         return Vec::new();
     }
     let (Ok(own), Ok(_)) = (plan(&SubDeviceConfig::from_info(info), info), plan(declared, info)) else {
         return Vec::new();
     };
-    let writes_pdos = declared.startup.iter().any(|command| process_data::writes_pdos(&command.action));
+    let writes_pdos = written::writes_pdos(declared);
     let mut differences = Vec::new();
     for area in &own.process_data {
         let mut got: Vec<u16> = area.pdos.iter().map(|pdo| pdo.index).collect();
@@ -77,7 +77,7 @@ fn wanted(declared: &SubDeviceConfig) -> BTreeMap<u8, Option<Vec<u16>>> {
 
 /// Whether a PDO is for tools only: the SII lists it, the SubDevice has no object for it (protocol ES-47). A
 /// declaration that is made from a description does not contain it.
-fn is_virtual(index: u16, info: &SubDeviceInfo) -> bool {
+pub(super) fn is_virtual(index: u16, info: &SubDeviceInfo) -> bool {
     info.pdo(index).is_some_and(|pdo| pdo.flags & Pdo::VIRTUAL != 0)
 }
 

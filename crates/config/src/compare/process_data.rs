@@ -1,14 +1,17 @@
 //! Whether the process data of a SubDevice can be brought to what a file declares. PDOs are written where the
 //! SubDevice has CoE and its SII permits it (protocol 4.2, 6.3); otherwise it keeps its own, and refuses SAFEOP if the
-//! length of a SyncManager is another one.
+//! length of a SyncManager is another one. A controller without a processor (device emulation) takes any.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use ringcat_engine::config::{PdoMapping, SdoDownload, StartupAction, SubDeviceConfig};
+use ringcat_engine::config::{PdoMapping, SubDeviceConfig};
 use ringcat_engine::info::SubDeviceInfo;
-use ringcat_engine::plan;
-use ringcat_wire::mailbox::coe::pdo_objects::is_of_pdos;
+use ringcat_engine::{AreaPlan, plan};
+use ringcat_wire::al::AlState;
+
+use super::assignment::is_virtual;
+use super::written::Written;
 
 /// Lengths of a SyncManager in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,87 +20,74 @@ pub(super) struct Lengths {
     pub(super) declared: u16,
     /// The one that the SubDevice has.
     pub(super) own: u16,
+    /// Why.
+    reason: Reason,
+}
+
+/// Why a SubDevice has another length than declared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Reason {
+    /// Its PDOs are fixed.
+    Fixed,
+    /// The start-up commands of the file write them.
+    Written,
+    /// The file does not have the SyncManager, or has it without a length.
+    LeftOut,
 }
 
 impl fmt::Display for Lengths {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Lengths { declared, own } = self;
-        write!(f, "expected a length of {declared}, got {own}: the PDOs of the SubDevice cannot be written")
+        let Lengths { declared, own, reason } = self;
+        let reason = match reason {
+            Reason::Fixed => ": the PDOs of the SubDevice cannot be written",
+            Reason::Written => " with the PDOs that the start-up commands leave",
+            Reason::LeftOut => ": the file has no process data for it",
+        };
+        write!(f, "expected a length of {declared}, got {own}{reason}")
     }
 }
 
 /// The SyncManagers whose length stays another one than declared.
 pub(super) fn unfit(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> BTreeMap<u8, Lengths> {
-    let has_dictionary = info.protocols.coe() && info.mailbox.is_some();
-    // What start-up commands write is not known from here.
-    if has_dictionary && declared.startup.iter().any(|command| writes_pdos(&command.action)) {
+    if info.device_emulation || !matches!(declared.target, AlState::SafeOp | AlState::Op) {
         return BTreeMap::new();
     }
     let (Ok(wanted), Ok(own)) = (plan(declared, info), plan(&SubDeviceConfig::from_info(info), info)) else {
         return BTreeMap::new();
     };
-    let of_file = |number: u8| declared.pdos.iter().flatten().find(|it| it.sync_manager == number);
-    let mut unfit = BTreeMap::new();
-    for area in &wanted.process_data {
-        let number = area.sync_manager;
-        if declared.declared.is_none() && of_file(number).is_none() {
-            continue;
+    let has_dictionary = info.protocols.coe() && info.mailbox.is_some();
+    let written = has_dictionary.then(|| Written::by(declared, info, &wanted.process_data));
+    let of_file = |number: &u8| declared.pdos.iter().flatten().any(|it| it.sync_manager == *number);
+    let is_exchanged =
+        |area: &&AreaPlan| area.pdos.is_empty() || !area.pdos.iter().all(|pdo| is_virtual(pdo.index, info));
+    let numbers = wanted.process_data.iter().map(|area| area.sync_manager);
+    // What a network file leaves out is as in the SII; what an ENI leaves out is not set up.
+    let compared: BTreeSet<u8> = match declared.declared {
+        None => numbers.filter(of_file).collect(),
+        Some(_) => {
+            let own = own.process_data.iter().filter(is_exchanged).map(|area| area.sync_manager);
+            numbers.chain(own).collect()
         }
-        let fixed = own.process_data.iter().find(|it| it.sync_manager == number).map(|it| it.length);
-        let held = if has_dictionary && declared.declared.is_none() {
-            let wanted: Vec<(u16, u32)> = area
-                .pdos
-                .iter()
-                .map(|pdo| (pdo.index, pdo.entries.iter().map(|entry| u32::from(entry.bit_length)).sum()))
-                .collect();
-            let is_fixed = |pdo: u16| {
-                let mut pdos = of_file(number).into_iter().flat_map(|it| &it.pdos);
-                pdos.any(|it| it.index == pdo && it.fixed)
-            };
-            held_bytes(&wanted, info, (number, fixed), is_fixed)
-        } else {
-            fixed
+    };
+    let mut unfit = BTreeMap::new();
+    for number in compared {
+        let area = wanted.process_data.iter().find(|area| area.sync_manager == number);
+        let fixed = own.process_data.iter().find(|area| area.sync_manager == number).map(|area| area.length);
+        let (held, is_written) = match &written {
+            Some(written) => written.bytes(number, fixed).unzip(),
+            None => (fixed, None),
         };
-        if let Some(own) = held.filter(|held| *held != area.length) {
-            unfit.insert(number, Lengths { declared: area.length, own });
+        let length = area.map_or(0, |area| area.length);
+        let reason = match is_written {
+            _ if length == 0 && declared.declared.is_some() => Reason::LeftOut,
+            Some(true) => Reason::Written,
+            _ => Reason::Fixed,
+        };
+        if let Some(own) = held.filter(|held| *held != length) {
+            unfit.insert(number, Lengths { declared: length, own, reason });
         }
     }
     unfit
-}
-
-/// The length with the PDOs and mappings that a SubDevice with CoE permits; `None` where it is not known.
-fn held_bytes(
-    wanted: &[(u16, u32)],
-    info: &SubDeviceInfo,
-    (sync_manager, fixed): (u8, Option<u16>),
-    is_fixed: impl Fn(u16) -> bool,
-) -> Option<u16> {
-    // An SII without CoE details contains no information about them.
-    let (can_assign, can_map) = match info.coe {
-        details if details.0 == 0 => (true, true),
-        details => (details.pdo_assign(), details.pdo_configuration()),
-    };
-    let mapped = |index: u16| {
-        let of_file =
-            wanted.iter().find(|(pdo, _)| can_map && *pdo == index && !is_fixed(index)).map(|(_, bits)| *bits);
-        of_file.or_else(|| info.pdo(index).map(|pdo| pdo.bit_length()))
-    };
-    let assigned: Vec<u16> = if can_assign {
-        wanted.iter().map(|(index, _)| *index).collect()
-    } else {
-        info.assigned_pdos(sync_manager).map(|pdo| pdo.index).collect()
-    };
-    if assigned.is_empty() && !can_assign {
-        return fixed;
-    }
-    let bits = assigned.into_iter().map(mapped).sum::<Option<u32>>()?;
-    u16::try_from(bits.div_ceil(8)).ok()
-}
-
-/// Whether a start-up command writes an assignment or a mapping.
-pub(super) fn writes_pdos(action: &StartupAction) -> bool {
-    let StartupAction::Sdo(SdoDownload { index, .. }) = action else { return false };
-    is_of_pdos(*index)
 }
 
 /// All PDOs of a declaration, with their SyncManagers.

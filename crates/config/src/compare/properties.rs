@@ -91,7 +91,7 @@ fn sync_managers(declared: &SubDeviceConfig, stated: Option<&Stated>, info: &Sub
     differences
 }
 
-/// Mode and direction of the mailboxes of an ENI; another one prevents PREOP.
+/// Mode and direction of the mailboxes of an ENI, and whether they are enabled; otherwise the SubDevice refuses PREOP.
 fn mailbox_controls(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> Vec<Property> {
     let mut differences = Vec::new();
     for it in declared.declared.iter().flatten() {
@@ -101,6 +101,10 @@ fn mailbox_controls(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> Vec<Pro
             _ => continue,
         };
         let (number, control) = (it.index, it.register.control);
+        if !it.register.activate.enable && it.register.length > 0 && info.mailbox.is_some() {
+            let text = format!("SM {number}: a mailbox that the file does not enable");
+            differences.push((DifferenceKind::SyncManager, true, text));
+        }
         let Some(own) = info.sync_managers.get(usize::from(number)) else { continue };
         if (control.bits() ^ own.control) & MODE != 0 {
             let prevents_op = control.mode != SyncManagerMode::Mailbox || control.direction != direction;

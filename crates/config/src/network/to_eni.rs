@@ -24,6 +24,10 @@ const OUTPUTS: u8 = 0x24;
 const INPUTS: u8 = 0x20;
 /// Watchdog enable in the control byte.
 const WATCHDOG: u8 = 0x40;
+/// What the ENI of a SubDevice without SyncManagers means.
+const WITHOUT_PROCESS_DATA: &str = "the file has no process data of it, and an ENI leaves none to the EEPROM: a \
+                                    SubDevice with process data does not reach SAFEOP then; `ringcat init` and \
+                                    `ringcat esi declare` write the tables `[[subdevice.sync_manager]]`";
 
 impl NetworkFile {
     /// The ENI of the network.
@@ -44,9 +48,8 @@ impl NetworkFile {
             config.sync_managers.clear();
             config.pdos = None;
             config.declared_bootstrap = bootstrap(of);
-            if declared.is_empty() && !is_scanned(of) {
-                let reason = "the file leaves its process data to the EEPROM: the ENI has none";
-                left_out.push(LeftOut::new(index, "sync_manager", reason));
+            if declared.iter().all(|it| it.area().is_none()) && !is_coupler(of) {
+                left_out.push(LeftOut::new(index, "sync_manager", WITHOUT_PROCESS_DATA));
             }
             config.declared = Some(declared);
         }
@@ -75,9 +78,11 @@ impl NetworkFile {
     }
 }
 
-/// A SubDevice of a scan has its mailbox or the kinds of its ports in the file, so it has no more process data.
-fn is_scanned(of: &SubDevice) -> bool {
-    !of.ports.is_empty() || of.mailbox.is_some()
+/// Couplers, extensions and junctions have no process data. Their ports show them: of two kinds, or more than two.
+fn is_coupler(of: &SubDevice) -> bool {
+    let ports: Vec<char> = of.ports.chars().filter(|kind| !kind.is_whitespace()).collect();
+    let has_branches = ports.len() > 2 || ports.windows(2).any(|pair| pair[0] != pair[1]);
+    has_branches && of.mailbox.is_none() && of.domain.is_none() && of.sync.is_none()
 }
 
 /// Mailboxes that a file leaves to the EEPROM. If the file has the ports of a SubDevice, the entry comes from a scan or
@@ -92,7 +97,7 @@ fn mailboxes(file: &NetworkFile) -> Vec<LeftOut> {
     );
     let mut left_out: Vec<_> =
         with_commands.iter().map(|(index, _)| LeftOut::new(*index, "mailbox", reason.clone())).collect();
-    let unknown = others.iter().filter(|(_, of)| !is_scanned(of)).count();
+    let unknown = others.iter().filter(|(_, of)| of.ports.is_empty()).count();
     if unknown > 0 {
         let reason = format!(
             "the file does not say whether {unknown} of {} SubDevices have mailboxes: the ENI has none, RingCAT takes \

@@ -117,3 +117,31 @@ fn mailboxes_left_to_the_eeprom_are_listed_if_a_subdevice_may_need_one() {
     file.subdevice[1].startup.retain(registers);
     assert_eq!(listed(&file), [], "commands to registers need none");
 }
+
+/// Ports and a mailbox do not show whether a SubDevice has process data. Couplers and junctions have none.
+// covers: eni-run
+#[test]
+fn process_data_that_is_left_to_the_eeprom_is_listed_but_not_of_couplers() {
+    let listed = |file: &NetworkFile| -> Vec<Option<usize>> {
+        let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        let left_out = export.left_out.iter().filter(|it| it.what == "sync_manager");
+        assert!(left_out.clone().all(|it| it.reason.contains("does not reach SAFEOP")), "{:?}", export.left_out);
+        left_out.map(|it| it.subdevice).collect()
+    };
+    let mut file = network(CELL);
+    let (coupler, terminal, camera) = (COUPLER, 3, Some(4));
+    assert_eq!((&file.subdevice[coupler].ports[..], &file.subdevice[terminal].ports[..]), ("YKY", "KK"));
+    assert_eq!(listed(&file), [camera]);
+    file.subdevice[DRIVE].sync_manager.clear();
+    assert_eq!(listed(&file), [Some(DRIVE), camera], "a mailbox");
+    file.subdevice[terminal].sync_manager.clear();
+    file.subdevice[terminal].domain = None;
+    assert_eq!(listed(&file), [Some(DRIVE), Some(terminal), camera], "two ports of a kind");
+    for (ports, is_listed) in [("YY", true), ("KY", false), ("K Y", false), ("YYYY", false), ("", true)] {
+        file.subdevice[coupler].ports = ports.to_owned();
+        assert_eq!(listed(&file).contains(&Some(coupler)), is_listed, "{ports:?}");
+    }
+    file.subdevice[coupler].ports = "YKY".to_owned();
+    file.subdevice[coupler].domain = file.domain.first().map(|domain| domain.name.clone());
+    assert!(listed(&file).contains(&Some(coupler)), "it names the domain of its process data");
+}

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use ringcat::config::network::Bytes;
 use ringcat::config::network::model::{Clocks, Connection, Junctions, Lrw, Sdo, Startup, Sync};
-use ringcat::config::{Configuration, Difference, DifferenceKind, ExportOptions, FoundNetwork, Stated};
+use ringcat::config::{Configuration, Difference, DifferenceKind, ExportOptions, FoundNetwork, LrwUse, Stated};
 use ringcat::eni::EniFile;
 use ringcat::esi::EsiDevices;
 use ringcat::network::{LoadedNetwork, NetworkFile, ScanOptions};
@@ -138,6 +138,45 @@ fn a_reference_without_a_clock_is_named_and_another_one_reported() {
     assert_eq!(events.iter().filter(|event| **event == expected).count(), 1, "{events:#?}");
     let reference: Vec<bool> = application.clocks().iter().map(|clock| clock.is_reference).collect();
     assert_eq!(reference, [true, false], "the coupler has the first clock");
+}
+
+/// The network has no clock, and no SubDevice needs one.
+// covers: network-file, dc-reference
+#[test]
+fn clocks_of_a_network_without_any_are_named() {
+    let device = |kind: &str| format!("[[device]]\ntype = \"{kind}\"\nclock_bits = 0\n");
+    let bus = &(device("coupler") + &device("digital-output-8"));
+    let clocks = |file: &mut NetworkFile| file.clocks = Some(Clocks::default());
+    assert_eq!(checked(&file_of(LINE, clocks), LINE), []);
+    let text = "the file declares distributed clocks (clocks), but no SubDevice has one";
+    assert_eq!(checked(&file_of(bus, clocks), bus), one(OfClocks, false, text));
+    assert_eq!(checked(&file_of(bus, |_| ()), bus), []);
+}
+
+/// A run refuses it on two interfaces, and splits it on request.
+// covers: network-file, eni-run
+#[test]
+fn an_lrw_over_several_subdevices_is_named_on_two_interfaces() {
+    let ring = format!("[segment]\nring = true\n{LINE}");
+    let network = file_of(LINE, |_| ());
+    let options = ExportOptions::default().with_lrw(LrwUse::Always);
+    let export = network.file.to_eni(&options).unwrap_or_else(|error| panic!("{error}"));
+    let eni = EniFile::from_bytes(export.text.as_bytes()).unwrap_or_else(|error| panic!("{error}"));
+    let differences = |bus: &str, is_ring: bool| {
+        let (_, scan) = scanned(bus, &Options::default());
+        let found = FoundNetwork::new(&scan.subdevices, &scan.topology).with_redundant(is_ring);
+        eni.configuration.differences(found, &eni.stated())
+    };
+    assert_eq!(differences(LINE, false), []);
+    let on_ring = differences(&ring, true);
+    assert_eq!(on_ring.iter().map(|it| (it.kind, it.prevents_op)).collect::<Vec<_>>(), [(Ring, false)], "{on_ring:#?}");
+    assert!(on_ring[0].text.contains("--split-lrw"), "{on_ring:#?}");
+    for is_split in [false, true] {
+        let (main_device, _) = scanned(&ring, &Options::default());
+        let reached = main_device.activate(eni.declaration(is_split)).map_err(|error| error.to_string());
+        let reached = reached.and_then(|mut it| it.wait_until_op(LIMIT).map_err(|error| error.to_string()));
+        assert_eq!(reached.is_ok(), is_split, "{reached:?}");
+    }
 }
 
 // covers: network-file, eni-run, dc-reference

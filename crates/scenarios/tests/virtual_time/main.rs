@@ -18,6 +18,7 @@ mod clock_shifts;
 mod clock_times;
 mod clocks;
 mod command_reports;
+mod compare_process_data;
 mod compare_refusals;
 mod configuration;
 mod copies;
