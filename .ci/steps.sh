@@ -185,7 +185,7 @@ demo() {
     local too_large=0
     cargo run --release
     cargo run --release -- demo --standby
-    small ringcat 10650000 || too_large=1
+    small ringcat 10750000 || too_large=1
     small ringcatd 7050000 || too_large=1
     small ethercat 1760000 || too_large=1
     return "$too_large"
