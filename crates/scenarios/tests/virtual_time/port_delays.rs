@@ -53,10 +53,10 @@ fn all(seeds: impl Iterator<Item = u64>, cuts: usize) -> Reported {
 // covers: registers, dc-delays
 #[test]
 fn delays_without_an_application_are_right_in_rings_behind_junctions_too() {
-    let reported = all(0..12, 1);
+    let reported = all(0..8, 1);
     assert_eq!(reported.wrong, Vec::<String>::new());
     assert_eq!(reported.missing_when_whole, Vec::<String>::new());
-    assert!(reported.right > 1_000, "{reported:?}");
+    assert!(reported.right > 600, "{reported:?}");
 }
 
 #[test]

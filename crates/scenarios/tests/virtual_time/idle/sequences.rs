@@ -343,5 +343,5 @@ fn seeds_of_sequences_of_calls_with_faults() {
 // covers: states, stop, junctions, registers
 #[test]
 fn seeds_of_sequences_in_rings_behind_junctions() {
-    explore("rings", seeds::from_environment().unwrap_or(0..12), run_of_rings);
+    explore("rings", seeds::from_environment().unwrap_or(0..8), run_of_rings);
 }
