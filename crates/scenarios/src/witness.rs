@@ -36,10 +36,12 @@ impl Frames {
         std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// Command and register address (ADO) of each datagram that the engine has sent since the last call. Frames are
-    /// dropped.
-    pub fn sent(&self) -> Vec<(u8, u16)> {
-        self.take().iter().filter(|passed| passed.is_sent).flat_map(|passed| datagrams(&passed.frame)).collect()
+    /// Link, command and register address (ADO) of each datagram that the engine has sent since the last call. Frames
+    /// are dropped.
+    pub fn sent(&self) -> Vec<(Link, u8, u16)> {
+        let sent = self.take().into_iter().filter(|passed| passed.is_sent);
+        let of = |passed: Passed| datagrams(&passed.frame).into_iter().map(move |(it, at)| (passed.link, it, at));
+        sent.flat_map(of).collect()
     }
 }
 

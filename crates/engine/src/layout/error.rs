@@ -29,10 +29,12 @@ pub enum LayoutError {
     /// With MainDevice redundancy: the frames of a cycle do not fit into it at 100 Mbit/s.
     CycleTooShort {
         /// Time on the wire in a cycle in which all domains are exchanged, with master frames and one acyclic frame
-        /// (of 1,514 bytes with Ethernet between both MainDevices), and twice the time in which the other MainDevice
-        /// forwards a frame: it receives a frame completely before it sends it.
+        /// (of 1,514 bytes with Ethernet between both MainDevices). Unless it is compared with a single period of
+        /// several that may be on the wire, with twice the time in which the other MainDevice forwards a frame: it
+        /// receives a frame completely before it sends it.
         needed: Duration,
-        /// The shortest period, multiplied by the number of cycles that may be on the wire.
+        /// What it does not fit into: the shortest period, multiplied by the number of cycles that may be on the wire
+        /// if the time contains the forwarding.
         period: Duration,
     },
 }

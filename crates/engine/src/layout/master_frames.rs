@@ -8,17 +8,16 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use ringcat_wire::datagram::{MAX_DATA, OVERHEAD};
-use ringcat_wire::frame::{ETHERCAT_HEADER_LEN, ETHERNET_HEADER_LEN, MIN_FRAME, frame_len, wire_time_ns};
+use ringcat_wire::frame::{MIN_FRAME, frame_len, wire_time_ns};
 use ringcat_wire::master_frame::{Answer, Area, Diagnosis, DomainRecord, FragmentHead, Header, Lengths};
 
 use super::{Layout, LayoutError};
 use crate::direction::Direction;
 use crate::domain::DomainId;
+use crate::ring::identity::DATAGRAMS_AT;
 
 /// Room for datagrams in a frame.
 const ROOM: usize = MAX_DATA + OVERHEAD;
-/// Bytes of a frame in front of its datagrams.
-const HEADERS: usize = ETHERNET_HEADER_LEN + ETHERCAT_HEADER_LEN;
 /// Bytes of a fragment without its part of the area.
 const EACH: usize = OVERHEAD + FragmentHead::LEN;
 /// Fewer bytes of an area do not share a frame with others, unless they are all of it.
@@ -133,16 +132,18 @@ impl PlannedMasterFrames {
         let fastest = layout.domains.iter().filter(|domain| domain.period > Duration::ZERO);
         let Some(fastest) = fastest.min_by_key(|domain| domain.period) else { return Ok(()) };
         let cyclic = layout.domains.iter().flat_map(|domain| &domain.frames);
-        let cyclic = cyclic.map(|frame| (HEADERS + frame.bytes()).max(MIN_FRAME));
+        let cyclic = cyclic.map(|frame| (DATAGRAMS_AT + frame.bytes()).max(MIN_FRAME));
         let times: Vec<u64> = cyclic.chain(self.frame_lengths()).map(wire_time_ns).collect();
         let on_wire = Duration::from_nanos(times.iter().sum::<u64>() + wire_time_ns(acyclic.max(MIN_FRAME)));
         // The other MainDevice sends a frame on when it has all of it, twice if a cable is broken (protocol 9.9).
         let needed = on_wire + 2 * Duration::from_nanos(times.iter().copied().max().unwrap_or_default());
         let period = fastest.period * u32::from(fastest.under_way.max(1));
-        if on_wire > fastest.period || needed > period {
-            return Err(LayoutError::CycleTooShort { needed, period });
+        // Cycles that overlap on the wire must not be sent faster than the wire takes their frames.
+        let limits = [(needed, period), (on_wire, fastest.period)];
+        match limits.into_iter().find(|(needed, period)| needed > period) {
+            Some((needed, period)) => Err(LayoutError::CycleTooShort { needed, period }),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// Number of fragments.
@@ -343,7 +344,17 @@ mod tests {
         let mut layout = with_period(exactly - 1);
         layout.domains[0].under_way = 2;
         assert_eq!(planned(&layout).check_time(&layout, 0), Ok(()));
-        layout.domains[0].period = Duration::from_micros(100);
-        assert!(planned(&layout).check_time(&layout, 0).is_err());
+        // Many frames with their forwarding fit into two cycles, but without it not into one.
+        let mut layout = self::layout(40, 100);
+        let planned = PlannedMasterFrames::new(MasterSizes::default(), &layout, 40).unwrap();
+        layout.domains[0].period = Duration::from_micros(1);
+        let Err(LayoutError::CycleTooShort { needed, .. }) = planned.check_time(&layout, 0) else {
+            panic!("too short")
+        };
+        (layout.domains[0].period, layout.domains[0].under_way) = (needed / 2 + Duration::from_nanos(1), 2);
+        let Err(LayoutError::CycleTooShort { needed, period }) = planned.check_time(&layout, 0) else {
+            panic!("the wire takes longer than a period")
+        };
+        assert!(needed > period && period == layout.domains[0].period, "{needed:?}, {period:?}");
     }
 }

@@ -19,7 +19,7 @@ use crate::config::{Resolution, resolve};
 use crate::domain::DomainId;
 use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionError};
-use crate::procedures::idle::without_watch;
+use crate::procedures::idle::{are_ports_as_scanned, without_watch};
 use crate::procedures::junction::{Reached, refute};
 use crate::procedures::scan::node_status;
 use crate::role::Function;
@@ -81,7 +81,12 @@ impl MainDevice {
                 let declared = DeclaredClosings::of(&loaded, of.view().found()?);
                 let closings: Vec<Closing> = declared.closings.iter().map(|(_, closing)| *closing).collect();
                 let reached = Reached { nodes: &declared.nodes, stations: &declared.stations };
-                let (number, shown) = refute((&testing, &of), reached, declared.main_count, &closings).await?;
+                let refuted = refute((&testing, &of), reached, declared.main_count, &closings).await;
+                // The test has read the ports.
+                let ports = declared.nodes.iter().map(|node| node.dl_status);
+                let scanned: Vec<_> = declared.stations.iter().copied().zip(ports).collect();
+                are_ports_as_scanned(&testing, &of, &scanned).await;
+                let (number, shown) = refuted?;
                 Some(JunctionError::NotThere { connection: declared.closings[number].0, shown })
             };
             match without_watch(&bus, &segment, test).await {

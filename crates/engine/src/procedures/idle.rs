@@ -8,6 +8,7 @@
 mod changes;
 mod pause;
 mod places;
+mod ports;
 mod rescue;
 mod state_turns;
 
@@ -24,8 +25,9 @@ use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlStatus, map};
 
-pub(crate) use changes::{are_ports_as_before, nothing, scan_again};
+pub(crate) use changes::{nothing, scan_again};
 pub(crate) use pause::without_watch;
+pub(crate) use ports::{are_ports_as_scanned, follow_ports};
 pub(crate) use rescue::rescue;
 
 use self::state_turns::StateTurns;

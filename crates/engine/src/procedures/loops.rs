@@ -23,7 +23,7 @@ use crate::supervisor::{Bus, BusError};
 /// Bytes of DL_CONTROL that are written: forwarding rule and temporary bit, loops.
 const WRITTEN: usize = 2;
 /// Time after which temporary settings have certainly expired.
-const TEMPORARY: Duration = Duration::from_millis(1_300);
+pub(super) const TEMPORARY: Duration = Duration::from_millis(1_300);
 /// Interval of the check for it.
 const PAUSE: Duration = Duration::from_millis(20);
 /// Attempts to restore settings: a frame that opens a path may not return itself.
@@ -75,10 +75,18 @@ fn orders(segment: &SharedSegment, station: StationAddress) -> Option<(u32, u32)
     segment.view().port_control(station).map(|it| (it.orders, it.under_way))
 }
 
-/// Writes settings, all in one frame: a second frame would be sent into a closed port.
+/// Writes settings, all in one frame: a second frame would be sent into a closed port. An error if a SubDevice is not
+/// reached.
 pub(super) async fn write(bus: &Bus, controls: Vec<(StationAddress, DlControl)>) -> Result<(), BusError> {
-    let writes = controls.into_iter().map(write_of);
-    bus.transfer_all(writes, Some(Wkc(1))).await.map(drop)
+    let expected = Wkc(1);
+    let replies = bus.transfer_all(controls.iter().copied().map(write_of), Some(expected)).await?;
+    match controls.iter().zip(&replies).find(|(_, reply)| reply.wkc() != expected) {
+        Some(((station, _), reply)) => {
+            let target = Target::Station(*station, map::DL_CONTROL);
+            Err(BusError::Wkc { target, expected, got: reply.wkc() })
+        }
+        None => Ok(()),
+    }
 }
 
 /// The datagram with these settings.
@@ -87,17 +95,15 @@ pub(super) fn write_of((station, control): (StationAddress, DlControl)) -> (Comm
 }
 
 /// Closes ports for a moment, in one frame, carries out `work`, and restores the settings of the model. `before`: the
-/// present settings of their SubDevices ([`controls`]). `closing`: how long to wait afterwards until a ring of two
-/// links is seen closed again; `None` does not wait. Returns an error, without `work`, if the ports could not be
-/// closed.
+/// present settings of their SubDevices ([`controls`]). Returns the result, an error without `work` if the ports could
+/// not be closed, and whether the settings were restored ([`restore`]).
 pub(super) async fn while_closed<T>(
     bus: &Bus,
     segment: &SharedSegment,
     before: &[(StationAddress, DlControl)],
     ports: &[(StationAddress, u8)],
-    closing: Option<Duration>,
     work: impl Future<Output = T>,
-) -> Result<T, BusError> {
+) -> (Result<T, BusError>, bool) {
     segment.observe(Observation::PortsAltered(before));
     let closed = segment.view().altered().into_iter();
     let closed = closed.map(|(station, control)| (station, closed_at(control, station, ports)));
@@ -106,12 +112,7 @@ pub(super) async fn while_closed<T>(
         Ok(()) => Ok(work.await),
         Err(error) => Err(error),
     };
-    let is_restored = restore(bus, segment).await;
-    if let Some(limit) = closing {
-        // Settings that could not be restored expire by themselves.
-        until_ring_is_closed(bus, if is_restored { limit } else { CLOSING_LIMIT }).await;
-    }
-    result
+    (result, restore(bus, segment).await)
 }
 
 /// The present loop settings of the SubDevices that have these ports. An error if one of the ports is closed.
@@ -174,8 +175,8 @@ pub(super) fn closed_at(control: DlControl, station: StationAddress, ports: &[(S
     DlControl { temporary: true, loops, ..control }
 }
 
-/// Waits until frames on both links have shown that the ring is closed.
-async fn until_ring_is_closed(bus: &Bus, limit: Duration) {
+/// Waits until frames on both links have shown that the ring is closed, for at most `limit`.
+pub(super) async fn until_ring_is_closed(bus: &Bus, limit: Duration) {
     let until = bus.now() + limit;
     while bus.now() < until {
         bus.sleep(CLOSING_PAUSE).await;

@@ -164,7 +164,7 @@ fn activation_after_deactivation_of_100_takes_the_state_changes_and_10_ms() {
         let what = format!("100 SubDevices, ring {is_ring}, idle operation {with_idle}, clocks {clocks}");
         println!("{what}: deactivation {deactivation:?}, activation {activation:?}, state changes {changes:?}");
         let sent = frames.sent();
-        let touched = sent.iter().filter(|(_, register)| SII_INTERFACE.contains(register)).count();
+        let touched = sent.iter().filter(|(_, _, register)| SII_INTERFACE.contains(register)).count();
         assert_eq!((touched, sent.len() > 1_000), (0, true), "{what}");
         let limit = changes + if clocks { WITH_CLOCKS } else { Duration::from_millis(10) };
         assert!(activation <= limit, "{what}: {activation:?}");

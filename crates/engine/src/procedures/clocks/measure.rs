@@ -21,7 +21,7 @@ use crate::clocks::{Cables, Disagreement, Latched, Measured, Measurements, Passa
 use crate::event::Subject;
 use crate::link::{Link, LinkSet};
 use crate::procedures::latch::{self as frames, Pauses};
-use crate::procedures::loops::{CLOSING_LIMIT, controls, while_closed};
+use crate::procedures::loops::{CLOSING_LIMIT, controls, until_ring_is_closed, while_closed};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::unassigned::view;
 use crate::ring::RingState;
@@ -168,8 +168,10 @@ async fn measure_open(
     open.is_whole = branches.is_empty();
     // The port at the end of a ring of two links is closed: frames on the redundant link do not return.
     open.no_return = survey.is_closed.then_some(Link::Redundant);
-    let closing = survey.is_closed.then_some(CLOSING_LIMIT);
-    let result = while_closed(bus, segment, &before, &ports, closing, take(bus, segment, &open)).await;
+    let (result, _) = while_closed(bus, segment, &before, &ports, take(bus, segment, &open)).await;
+    if survey.is_closed {
+        until_ring_is_closed(bus, CLOSING_LIMIT).await;
+    }
     drop(turn);
     result.map_err(|error| error.to_string())?.map(drop)
 }

@@ -11,6 +11,7 @@ use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::{DlStatus, map};
 
 use super::places::wrong_addresses;
+use super::ports::are_ports_as_scanned;
 use crate::info::{SiiExtent, SubDeviceInfo};
 use crate::junction::JunctionMode;
 use crate::procedures::dictionary::complete;
@@ -72,24 +73,11 @@ pub(crate) async fn scan_again(
     let Learned { topology, .. } = connect((bus, segment), options.junctions, &infos, main_count).await?;
     if options.junctions == JunctionMode::Automatic {
         // The examination of rings has closed ports for a moment: their ECAT events would cause another scan, and that
-        // another examination.
-        bus.brd(map::DL_STATUS, DlStatus::LEN).await?;
+        // another examination. A port that goes up and down repeatedly must not prevent a scan of new SubDevices.
         let read: Vec<(StationAddress, DlStatus)> = infos.iter().map(|info| (info.station, info.dl_status)).collect();
-        if !are_ports_as_before(bus, &read).await? {
-            // A port that goes up and down repeatedly must not prevent a scan of new SubDevices.
-            segment.observe_idle(IdleObservation::RescanAsked);
-        }
+        are_ports_as_scanned(bus, segment, &read).await;
     }
     Ok((seen(bus).await?.as_ref() == Some(&now)).then_some(Found { subdevices, topology, main_count }))
-}
-
-/// Whether all SubDevices answer, and their ports are as they were.
-pub(crate) async fn are_ports_as_before(bus: &Bus, before: &[(StationAddress, DlStatus)]) -> Result<bool, BusError> {
-    let read = bus.gather(before.to_vec(), |bus, (station, before)| async move {
-        Ok::<_, BusError>(DlStatus::decode(&bus.fprd_array(station, map::DL_STATUS).await?).ports == before.ports)
-    });
-    let read = read.await.into_iter().collect::<Result<Vec<bool>, BusError>>()?;
-    Ok(read.into_iter().all(|is_same| is_same))
 }
 
 /// Gives each SubDevice with one of these addresses one of its own, in as many rounds as that takes. `None` if no

@@ -11,15 +11,12 @@
 //! three tests, however long it is.
 
 use alloc::vec::Vec;
-use core::time::Duration;
 
-use ringcat_wire::address::{StationAddress, Wkc};
-use ringcat_wire::command::Command;
-use ringcat_wire::datagram::Target;
-use ringcat_wire::register::{DlControl, LoopControl, map};
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::register::map;
 
 use crate::order::InOrder;
-use crate::procedures::loops::lasting;
+use crate::procedures::loops::{TEMPORARY, closed_at, lasting, write};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::segment::Observation;
 use crate::supervisor::{Bus, BusError};
@@ -29,10 +26,6 @@ use crate::topology::{Closing, NodeStatus, PortOf, Topology, candidates_with};
 const TRIES: usize = 256;
 /// Maximum number of failed tests without a returned frame: these cost [`TEMPORARY`] each.
 const SLOW_TRIES: usize = 16;
-/// Time after which temporary loop settings have certainly expired.
-const TEMPORARY: Duration = Duration::from_millis(1_200);
-/// Bytes of DL_CONTROL that are written: forwarding rule and temporary bit, loops.
-const WRITTEN: usize = 2;
 
 /// SubDevices by position: their ports, and their station addresses.
 #[derive(Clone, Copy, Debug)]
@@ -140,7 +133,7 @@ pub(super) async fn with_closed(
     }
     // The model keeps the settings: a scan or a stop that begins meanwhile restores them.
     segment.observe(Observation::PortsAltered(&before));
-    let close = ports.iter().zip(&before).map(|((station, port), (_, control))| (*station, closed(*control, *port)));
+    let close = before.iter().map(|(station, control)| (*station, closed_at(*control, *station, &ports)));
     let result = match write(bus, close.collect()).await {
         Ok(()) => answering(bus, stations).await,
         Err(error) => Err(error),
@@ -165,26 +158,4 @@ async fn answering(bus: &Bus, stations: &[StationAddress]) -> Result<Vec<bool>, 
         }
     });
     answers.await.into_iter().collect()
-}
-
-fn closed(control: DlControl, port: u8) -> DlControl {
-    let mut loops = control.loops;
-    if let Some(setting) = loops.get_mut(usize::from(port)) {
-        *setting = LoopControl::Closed;
-    }
-    DlControl { temporary: true, loops, ..control }
-}
-
-/// All in one frame: a second frame would be sent into a closed port.
-async fn write(bus: &Bus, controls: Vec<(StationAddress, DlControl)>) -> Result<(), BusError> {
-    let target = |station: &StationAddress| Target::Station(*station, map::DL_CONTROL);
-    let writes = controls
-        .iter()
-        .map(|(station, control)| (Command::Fpwr, target(station), control.encode()[..WRITTEN].to_vec()));
-    let expected = Wkc(1);
-    let replies = bus.transfer_all(writes, Some(expected)).await?;
-    match controls.iter().zip(&replies).find(|(_, reply)| reply.wkc() != expected) {
-        Some(((station, _), reply)) => Err(BusError::Wkc { target: target(station), expected, got: reply.wkc() }),
-        None => Ok(()),
-    }
 }

@@ -27,8 +27,7 @@ const TRIES: usize = 2;
 const SCANS: u8 = 5;
 const PAUSE: Duration = Duration::from_millis(2);
 
-/// The number of a closing cable that is not where it was declared, and the evidence. Every SubDevice has the station
-/// address of its position.
+/// The number of a closing cable that is not where it was declared, and the evidence.
 pub(crate) async fn refute(
     on @ (bus, _): (&Bus, &SharedSegment),
     scanned: Reached<'_>,

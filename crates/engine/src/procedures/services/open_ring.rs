@@ -8,11 +8,11 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::{DlStatus, map};
 
 use crate::link::LinkSet;
-use crate::procedures::idle::{are_ports_as_before, without_watch};
-use crate::procedures::loops::{controls, while_closed};
+use crate::procedures::idle::{are_ports_as_scanned, without_watch};
+use crate::procedures::loops::{CLOSING_LIMIT, controls, until_ring_is_closed, while_closed};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::ring::RingState;
-use crate::segment::{IdleObservation, Observation, Segment};
+use crate::segment::Segment;
 use crate::supervisor::Bus;
 
 /// Maximum wait until an opened ring of two links is seen closed again: broadcasts pause meanwhile, and a ring that
@@ -45,34 +45,17 @@ pub(super) async fn while_open<T: 'static, U: 'static>(
         let stations = |segment: &Segment| segment.found().map(|found| found.stations());
         let are_same =
             stations(&segment.view()).is_some_and(|now| now.iter().eq(rings.status.iter().map(|(at, _)| at)));
-        if !are_same || !is_as_scanned(&bus, &segment, &rings.status).await {
+        if !are_same || !are_ports_as_scanned(&bus, &segment, &rings.status).await {
             return None;
         }
         let opened = close_ports(&bus, &segment, &rings.ports, open).await;
         let closed = whole.await;
         // Otherwise the events of these ports would cause another scan and another examination of the rings.
         let is_cleared = bus.brd(map::DL_STATUS, DlStatus::LEN).await.is_ok();
-        let is_as_before = is_as_scanned(&bus, &segment, &rings.status).await;
+        let is_as_before = are_ports_as_scanned(&bus, &segment, &rings.status).await;
         Some((opened?, closed)).filter(|_| is_cleared && is_as_before)
     };
     without_watch(bus, segment, work).await.flatten()
-}
-
-/// Whether the ports are as the last scan has found them. Reading them clears their ECAT events, so a difference has
-/// idle operation scan again; an application that has begun meanwhile looks at them itself.
-async fn is_as_scanned(bus: &Bus, segment: &SharedSegment, scanned: &[(StationAddress, DlStatus)]) -> bool {
-    let is_same = are_ports_as_before(bus, scanned).await.unwrap_or(false);
-    follow_ports(segment, is_same);
-    is_same
-}
-
-/// The ECAT events of the ports were cleared. `is_same`: the ports are as the last scan has found them.
-pub(super) fn follow_ports(segment: &SharedSegment, is_same: bool) {
-    if segment.view().is_active() {
-        segment.observe(Observation::RoundWanted);
-    } else if !is_same {
-        segment.observe_idle(IdleObservation::RescanAsked);
-    }
 }
 
 async fn close_ports<T>(
@@ -88,5 +71,12 @@ async fn close_ports<T>(
         return None;
     }
     let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
-    while_closed(bus, segment, &before, ports, is_closed.then_some(CLOSING), work).await.ok()
+    let (result, is_restored) = while_closed(bus, segment, &before, ports, work).await;
+    match is_restored {
+        true if is_closed => until_ring_is_closed(bus, CLOSING).await,
+        true => {}
+        // A port that is out of reach opens by itself. Until then SubDevices behind it would count as removed.
+        false => until_ring_is_closed(bus, CLOSING_LIMIT).await,
+    }
+    result.ok()
 }

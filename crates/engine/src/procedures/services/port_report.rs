@@ -18,10 +18,11 @@ use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DcReceiveTimes, DlStatus, ErrorCounters, PortKind, map};
 
 use super::ServiceError;
-use super::open_ring::{Rings, follow_ports, while_open};
+use super::open_ring::{Rings, while_open};
 use crate::clocks::{Cables, Latched, Measurements, Wiring};
 use crate::declared::{Address, SubDeviceId};
 use crate::link::{Link, LinkSet};
+use crate::procedures::idle::follow_ports;
 use crate::procedures::latch::latch_anyway;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::ring::RingState;
@@ -210,14 +211,8 @@ struct Samples {
 impl Samples {
     /// `is_closed`: the ring of two links is closed.
     async fn take(bus: &Bus, segment: &SharedSegment, known: &Rc<Known>, is_closed: bool) -> Samples {
-        let read = |bus: Bus, station: StationAddress| async move {
-            Some(DlStatus::decode(&bus.fprd_array(station, map::DL_STATUS).await.ok()?))
-        };
-        let status = bus.gather(known.stations.clone(), read).await;
-        let port = |at: PortOf| {
-            let status = status.get(at.node).copied().flatten();
-            status.map(|status| status.ports[usize::from(at.port & 3)])
-        };
+        // Delays are reported only if the ports are still as scanned.
+        let port = |at: PortOf| known.scanned.get(at.node).map(|(_, status)| status.ports[usize::from(at.port & 3)]);
         let is_open = |at: PortOf| port(at).is_some_and(|port| port.communication && !port.loop_closed);
         let enters = |node: usize| port(PortOf { node, port: 0 }).is_some_and(|port| port.communication);
         let wiring = Wiring::new(&known.topology, is_closed, is_open);

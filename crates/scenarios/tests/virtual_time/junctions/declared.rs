@@ -9,6 +9,7 @@ use ringcat::{
 use ringcat_sim::cable::{CableId, Endpoint};
 use ringcat_sim::frame::Port::{A, B, C, D};
 use ringcat_sim::network::Network;
+use ringcat_wire::register::DlStatus;
 use scenarios::dice::Dice;
 use scenarios::segments::{MAIN, REDUNDANT, RING_OF_THREE, TWO_RINGS, at, descriptions, wired, wired_with};
 use scenarios::tap::Tap;
@@ -222,4 +223,30 @@ fn a_wrong_connection_is_not_accepted_while_a_scan_begins() {
         not_tested += usize::from(matches!(checked, Some(Err(JunctionError::NotTested))));
     }
     assert!(not_tested > 0, "no scan began in a test");
+}
+
+/// The test reads the ports, and thereby clears the events that show a change to idle operation.
+// covers: JR-05, JR-06, junctions, ring-goes-on
+#[test]
+fn a_change_that_only_the_test_of_a_connection_sees_is_followed() {
+    const CLOSING: CableId = CableId(RING_OF_THREE[3]);
+    let status = |main_device: &MainDevice<Tap>| -> Vec<DlStatus> {
+        main_device.subdevices().iter().map(|info| info.dl_status).collect()
+    };
+    for after in 0..25 {
+        let options = Options::default().with_idle_operation(true).with_junctions(JunctionMode::Strict);
+        let mut main_device = MainDevice::request(Tap::new(one_ring()), &options);
+        main_device.attend(Duration::from_secs(1));
+        let whole = status(&main_device);
+        main_device.load(automatic(&main_device.subdevices(), CYCLE)).expect("it fits");
+        main_device.add_junction_connection(STRICT).expect("ports that exist");
+        main_device.links_mut().network_mut().cut(CLOSING);
+        main_device.attend(Duration::from_secs(1));
+        assert_ne!(status(&main_device), whole, "the cut is followed");
+        main_device.links_mut().network_mut().heal(CLOSING);
+        main_device.attend(Duration::from_millis(after));
+        let _ = main_device.check_connections();
+        main_device.attend(Duration::from_secs(1));
+        assert_eq!(status(&main_device), whole, "{after} ms after it was repaired");
+    }
 }

@@ -1,8 +1,10 @@
 //! Clocks of a known segment: delays and drifts travel, and are measured again only where the segment is another one.
 
 use super::*;
+use ringcat::Link;
 use ringcat_sim::cable::CableId;
 use ringcat_sim::fault::Fault;
+use ringcat_wire::command::Command;
 use scenarios::clocks::{clock_tree, clocked, delay, spread};
 use scenarios::witness::{Frames, Witness};
 
@@ -35,22 +37,8 @@ type Watched = Witness<Tap>;
 
 /// Frames with which clocks latched receive times (BWR 0x0900), each link's copy once.
 fn latches(frames: &Frames) -> usize {
-    let is_latch = |frame: &[u8]| {
-        let mut at = 16;
-        while let Some(header) = frame.get(at..at + 10) {
-            let length = u16::from_le_bytes([header[6], header[7]]);
-            if header[0] == 8 && header[4..6] == [0x00, 0x09] {
-                return true;
-            }
-            at += 12 + usize::from(length & 0x07FF);
-            if length & 0x8000 == 0 {
-                break;
-            }
-        }
-        false
-    };
-    let sent = frames.take().into_iter().filter(|passed| passed.is_sent && passed.link == ringcat::Link::Main);
-    sent.filter(|passed| is_latch(&passed.frame)).count()
+    let latch = (Link::Main, Command::Bwr.code(), map::DC_RECEIVE_TIME.0);
+    frames.sent().into_iter().filter(|sent| *sent == latch).count()
 }
 
 fn watched(links: Tap) -> (MainDevice<Watched>, Frames) {

@@ -1,0 +1,42 @@
+//! The ports of all SubDevices, compared with the last scan, after work that has closed ports or read their states.
+//!
+//! Reading DL status clears the ECAT event of the ports, with which a broadcast shows a change: what has read it must
+//! see to it that a change is followed.
+
+use alloc::vec::Vec;
+
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::register::{DlStatus, map};
+
+use crate::procedures::shared_segment::SharedSegment;
+use crate::segment::{IdleObservation, Observation};
+use crate::supervisor::{Bus, BusError};
+
+/// DL status of each SubDevice, by position, as a scan has found it.
+pub(crate) type Scanned = [(StationAddress, DlStatus)];
+
+/// Whether all SubDevices answer with the ports that the scan has found. If not, they are scanned again
+/// ([`follow_ports`]).
+pub(crate) async fn are_ports_as_scanned(bus: &Bus, segment: &SharedSegment, scanned: &Scanned) -> bool {
+    let is_same = are_same(bus, scanned).await.unwrap_or(false);
+    follow_ports(segment, is_same);
+    is_same
+}
+
+async fn are_same(bus: &Bus, scanned: &Scanned) -> Result<bool, BusError> {
+    let read = bus.gather(scanned.to_vec(), |bus, (station, before)| async move {
+        Ok::<_, BusError>(DlStatus::decode(&bus.fprd_array(station, map::DL_STATUS).await?).ports == before.ports)
+    });
+    let read = read.await.into_iter().collect::<Result<Vec<bool>, BusError>>()?;
+    Ok(read.into_iter().all(|is_same| is_same))
+}
+
+/// The ECAT events of the ports were cleared by reading DL status. `is_same`: the ports are as the last scan has found
+/// them. If not, idle operation scans again; an application reads all ports itself.
+pub(crate) fn follow_ports(segment: &SharedSegment, is_same: bool) {
+    if segment.view().is_active() {
+        segment.observe(Observation::RoundWanted);
+    } else if !is_same {
+        segment.observe_idle(IdleObservation::RescanAsked);
+    }
+}
