@@ -233,20 +233,20 @@ fn a_change_that_only_the_test_of_a_connection_sees_is_followed() {
     let status = |main_device: &MainDevice<Tap>| -> Vec<DlStatus> {
         main_device.subdevices().iter().map(|info| info.dl_status).collect()
     };
-    for after in 0..25 {
+    for (after, declared) in (0..25).flat_map(|after| [(after, STRICT), (after, connection((1, 3, 1)))]) {
         let options = Options::default().with_idle_operation(true).with_junctions(JunctionMode::Strict);
         let mut main_device = MainDevice::request(Tap::new(one_ring()), &options);
         main_device.attend(Duration::from_secs(1));
         let whole = status(&main_device);
         main_device.load(automatic(&main_device.subdevices(), CYCLE)).expect("it fits");
-        main_device.add_junction_connection(STRICT).expect("ports that exist");
+        main_device.add_junction_connection(declared).expect("ports that exist");
         main_device.links_mut().network_mut().cut(CLOSING);
         main_device.attend(Duration::from_secs(1));
         assert_ne!(status(&main_device), whole, "the cut is followed");
         main_device.links_mut().network_mut().heal(CLOSING);
         main_device.attend(Duration::from_millis(after));
-        let _ = main_device.check_connections();
+        assert_eq!(main_device.check_connections().is_ok(), declared == STRICT, "{after}, {declared}");
         main_device.attend(Duration::from_secs(1));
-        assert_eq!(status(&main_device), whole, "{after} ms after it was repaired");
+        assert_eq!(status(&main_device), whole, "{after} ms after it was repaired, {declared}");
     }
 }
