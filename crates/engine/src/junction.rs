@@ -98,7 +98,8 @@ pub enum JunctionError {
         /// The evidence.
         shown: ClosingEvidence,
     },
-    /// Connections could not be tested: the segment was being scanned, or read after a change, for seconds.
+    /// Connections could not be tested: the segment changed during each test, or a scan, another procedure or an
+    /// application was using it.
     NotTested,
 }
 
@@ -157,7 +158,7 @@ impl fmt::Display for JunctionError {
                 write!(f, "{head_port}: with these ports closed {shown}")
             }
             JunctionError::NotTested => {
-                f.write_str("the junction connections could not be tested: the segment is being scanned or read")
+                f.write_str("the junction connections could not be tested: the segment changes, or is in use")
             }
             JunctionError::NoConnection => f.write_str("strict junction redundancy needs at least one connection"),
         }

@@ -20,7 +20,7 @@ use crate::domain::DomainId;
 use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionError};
 use crate::procedures::idle::{are_ports_as_scanned, without_watch};
-use crate::procedures::junction::{Reached, refute};
+use crate::procedures::junction::{Reached, Refuted, refute};
 use crate::procedures::scan::node_status;
 use crate::role::Function;
 use crate::segment::Found;
@@ -62,12 +62,13 @@ impl MainDevice {
     }
 
     /// Before the last step, if connections were added: tests whether the rings close as declared. This takes some
-    /// frames, and about two seconds if a ring does not close there. A ring whose closing cable is open at both ends,
+    /// frames, and about three seconds if a ring does not close there. A ring whose closing cable is open at both ends,
     /// or whose SubDevices are not all present, is accepted without a test. Errors that [`MainDevice::apply`] detects
     /// are not checked here.
     ///
     /// The result is [`JunctionError::NotThere`] if a ring does not close as declared, [`JunctionError::NotTested`] if
-    /// the segment is being scanned, or read after a change, for longer than ten seconds.
+    /// the segment changes during each of five tests, if a scan or an application begins meanwhile, or if a scan or
+    /// another procedure uses the segment for longer than five seconds each.
     pub fn start_connection_check(&mut self) -> Pending<Result<(), JunctionError>> {
         let bus = self.supervisor.bus();
         let is_permitted = self.active().is_none() && self.permit(Function::Activate).is_ok();
@@ -86,14 +87,15 @@ impl MainDevice {
                 let ports = declared.nodes.iter().map(|node| node.dl_status);
                 let scanned: Vec<_> = declared.stations.iter().copied().zip(ports).collect();
                 are_ports_as_scanned(&testing, &of, &scanned).await;
-                let (number, shown) = refuted?;
-                Some(JunctionError::NotThere { connection: declared.closings[number].0, shown })
+                Some(match refuted {
+                    Refuted::None => Ok(()),
+                    Refuted::Closing(number, shown) => {
+                        Err(JunctionError::NotThere { connection: declared.closings[number].0, shown })
+                    }
+                    Refuted::NotTested => Err(JunctionError::NotTested),
+                })
             };
-            match without_watch(&bus, &segment, test).await {
-                Some(None) => Ok(()),
-                Some(Some(error)) => Err(error),
-                None => Err(JunctionError::NotTested),
-            }
+            without_watch(&bus, &segment, test).await.flatten().unwrap_or(Err(JunctionError::NotTested))
         })
     }
 

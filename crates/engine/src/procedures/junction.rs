@@ -16,4 +16,4 @@ pub(crate) use self::learn::Reached;
 pub(super) use self::learn::learn;
 pub(super) use self::orders::note_controls;
 pub(crate) use self::orders::{UnderWay, ordering};
-pub(crate) use self::refute::refute;
+pub(crate) use self::refute::{Refuted, refute};

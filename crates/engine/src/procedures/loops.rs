@@ -18,6 +18,7 @@ use super::shared_segment::SharedSegment;
 use crate::order::InOrder;
 use crate::ring::RingState;
 use crate::segment::Observation;
+use crate::segment::disturbance::Disturbance;
 use crate::supervisor::{Bus, BusError};
 
 /// Bytes of DL_CONTROL that are written: forwarding rule and temporary bit, loops.
@@ -31,8 +32,6 @@ const TRIES: usize = 2;
 /// Attempts to read settings while the application writes them.
 const READS: usize = 4;
 
-/// Maximum wait until an opened ring is closed again: temporary loop settings expire within a second.
-pub(super) const CLOSING_LIMIT: Duration = Duration::from_millis(1_200);
 /// Interval of the check whether the ring is closed.
 const CLOSING_PAUSE: Duration = Duration::from_millis(1);
 
@@ -40,20 +39,33 @@ const CLOSING_PAUSE: Duration = Duration::from_millis(1);
 pub(super) const LOOPS: RegisterAddress = map::DL_CONTROL.offset(1);
 
 /// The settings of a SubDevice. Waits until temporary settings have expired, as those of examined rings: a value
-/// written meanwhile would expire with them.
-pub(super) async fn lasting(bus: &Bus, station: StationAddress) -> Result<DlControl, BusError> {
+/// written meanwhile would expire with them. `None` if another program sets them again and again.
+pub(super) async fn lasting(bus: &Bus, station: StationAddress) -> Result<Option<DlControl>, BusError> {
     let until = bus.now() + TEMPORARY;
     loop {
         let control = DlControl::decode(&bus.fprd_array(station, map::DL_CONTROL).await?);
-        if !control.temporary || bus.now() >= until {
-            return Ok(DlControl { temporary: false, ..control });
+        if !control.temporary {
+            return Ok(Some(control));
+        }
+        if bus.now() >= until {
+            return Ok(None);
         }
         bus.sleep(PAUSE).await;
     }
 }
 
+/// Waits until none of these SubDevices has temporary settings any more, for at most [`TEMPORARY`].
+pub(super) async fn until_expired(bus: &Bus, stations: impl Iterator<Item = StationAddress>) {
+    let until = bus.now() + TEMPORARY;
+    for station in stations {
+        while bus.now() < until && !matches!(lasting(bus, station).await, Ok(Some(_))) {
+            bus.sleep(PAUSE).await;
+        }
+    }
+}
+
 /// The settings of a SubDevice, which the model follows from now on: what the application orders later is known. `None`
-/// if the application writes them again and again.
+/// if the application or another program writes them again and again.
 pub(super) async fn followed(
     bus: &Bus,
     segment: &SharedSegment,
@@ -62,7 +74,7 @@ pub(super) async fn followed(
     segment.observe(Observation::PortsFollowed(station));
     for _ in 0..READS {
         let before = orders(segment, station);
-        let control = lasting(bus, station).await?;
+        let Some(control) = lasting(bus, station).await? else { break };
         if let Some((orders, 0)) = before.filter(|before| Some(*before) == orders(segment, station)) {
             segment.observe(Observation::PortsRead { station, orders, control });
             return Ok(Some(control));
@@ -124,6 +136,9 @@ pub(super) async fn controls(
     let mut stations: Vec<StationAddress> = ports.iter().map(|(station, _)| *station).collect();
     stations.put_in_order();
     stations.dedup();
+    if stations.len() > bus.max_datagrams() {
+        return Err(format!("{} SubDevices have ports to close, more than datagrams in a frame", stations.len()));
+    }
     let mut controls = Vec::new();
     for station in stations {
         let read = followed(bus, segment, station).await.map_err(|error| error.to_string())?;
@@ -154,6 +169,13 @@ pub(crate) async fn restore(bus: &Bus, segment: &SharedSegment) -> bool {
     }
     segment.observe(Observation::PortsAltered(&[]));
     is_restored
+}
+
+/// Restores ports that a scan had closed when an application ended it. Procedures of the application that close ports
+/// wait for it.
+pub(crate) async fn restore_in_turn(bus: &Bus, segment: &SharedSegment) {
+    let _turn = segment.disturb(Disturbance::OpenByPort, TEMPORARY).await;
+    restore(bus, segment).await;
 }
 
 /// Restores ports at the end of an application, within a quarter of its limit: lost frames must not take the time of

@@ -15,7 +15,7 @@ use crate::main_device::Options;
 
 /// Longest wait of a hand-over until temporarily closed ports are open again: their temporary settings have expired by
 /// then.
-const OPENED: Duration = Duration::from_secs(2);
+const OPENED: Duration = Duration::from_secs(3);
 
 impl SupervisorThread {
     /// Starts the thread as [`SupervisorThread::start`], and goes on with a segment that another process has known,
@@ -58,7 +58,7 @@ impl SupervisorThread {
 
     /// Ends the thread without a further frame, and returns what is known of the segment, for another process that goes
     /// on with it. All handles get [`Error::Gone`] from then on. If ports are closed for a measurement of delays, waits
-    /// until they are open again, at most 2 s.
+    /// until they are open again, at most 3 s.
     ///
     /// # Errors
     /// The thread has ended.

@@ -4,6 +4,7 @@ mod closed_ports;
 mod declared;
 mod explorer;
 mod groups;
+mod interrupted;
 mod learning;
 mod plans;
 mod second_breaks;

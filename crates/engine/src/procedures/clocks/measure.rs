@@ -21,7 +21,7 @@ use crate::clocks::{Cables, Disagreement, Latched, Measured, Measurements, Passa
 use crate::event::Subject;
 use crate::link::{Link, LinkSet};
 use crate::procedures::latch::{self as frames, Pauses};
-use crate::procedures::loops::{CLOSING_LIMIT, controls, until_ring_is_closed, while_closed};
+use crate::procedures::loops::{TEMPORARY, controls, until_expired, until_ring_is_closed, while_closed};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::unassigned::view;
 use crate::ring::RingState;
@@ -168,9 +168,12 @@ async fn measure_open(
     open.is_whole = branches.is_empty();
     // The port at the end of a ring of two links is closed: frames on the redundant link do not return.
     open.no_return = survey.is_closed.then_some(Link::Redundant);
-    let (result, _) = while_closed(bus, segment, &before, &ports, take(bus, segment, &open)).await;
+    let (result, is_restored) = while_closed(bus, segment, &before, &ports, take(bus, segment, &open)).await;
+    if !is_restored {
+        until_expired(bus, before.iter().map(|(station, _)| *station)).await;
+    }
     if survey.is_closed {
-        until_ring_is_closed(bus, CLOSING_LIMIT).await;
+        until_ring_is_closed(bus, TEMPORARY).await;
     }
     drop(turn);
     result.map_err(|error| error.to_string())?.map(drop)

@@ -11,7 +11,7 @@ use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::{DlStatus, map};
 
 use super::places::wrong_addresses;
-use super::ports::are_ports_as_scanned;
+use super::ports::compare_ports;
 use crate::info::{SiiExtent, SubDeviceInfo};
 use crate::junction::JunctionMode;
 use crate::procedures::dictionary::complete;
@@ -75,7 +75,7 @@ pub(crate) async fn scan_again(
         // The examination of rings has closed ports for a moment: their ECAT events would cause another scan, and that
         // another examination. A port that goes up and down repeatedly must not prevent a scan of new SubDevices.
         let read: Vec<(StationAddress, DlStatus)> = infos.iter().map(|info| (info.station, info.dl_status)).collect();
-        are_ports_as_scanned(bus, segment, &read).await;
+        compare_ports(bus, segment, &read).await?;
     }
     Ok((seen(bus).await?.as_ref() == Some(&now)).then_some(Found { subdevices, topology, main_count }))
 }

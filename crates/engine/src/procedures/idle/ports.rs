@@ -18,9 +18,17 @@ pub(crate) type Scanned = [(StationAddress, DlStatus)];
 /// Whether all SubDevices answer with the ports that the scan has found. If not, they are scanned again
 /// ([`follow_ports`]).
 pub(crate) async fn are_ports_as_scanned(bus: &Bus, segment: &SharedSegment, scanned: &Scanned) -> bool {
-    let is_same = are_same(bus, scanned).await.unwrap_or(false);
+    compare_ports(bus, segment, scanned).await.unwrap_or_else(|_| {
+        follow_ports(segment, false);
+        false
+    })
+}
+
+/// As [`are_ports_as_scanned`], for a scan: with an error it repeats itself.
+pub(super) async fn compare_ports(bus: &Bus, segment: &SharedSegment, scanned: &Scanned) -> Result<bool, BusError> {
+    let is_same = are_same(bus, scanned).await?;
     follow_ports(segment, is_same);
-    is_same
+    Ok(is_same)
 }
 
 async fn are_same(bus: &Bus, scanned: &Scanned) -> Result<bool, BusError> {

@@ -16,9 +16,8 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::map;
 
 use crate::order::InOrder;
-use crate::procedures::loops::{TEMPORARY, closed_at, lasting, write};
+use crate::procedures::loops::{TEMPORARY, controls, while_closed};
 use crate::procedures::shared_segment::SharedSegment;
-use crate::segment::Observation;
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{Closing, NodeStatus, PortOf, Topology, candidates_with};
 
@@ -72,6 +71,7 @@ pub(in super::super) async fn learn(
                     slow += 1;
                     continue 'sets;
                 }
+                Tried::NotClosed => break 'sets,
             }
         }
         set.put_in_order();
@@ -88,6 +88,8 @@ enum Tried {
     Wrong { last_silent: Option<usize> },
     /// No frame returned.
     NoFrame,
+    /// The ports are being set by the application or another program.
+    NotClosed,
 }
 
 /// Tests whether a ring closes here.
@@ -102,7 +104,11 @@ async fn attempt(
     // SubDevices behind a break are reached through the closing cable only.
     let silent = |node: usize| broken.is_some_and(|first| topology.is_behind(node, first));
     let ports = if broken.is_some() { Vec::from([head]) } else { Vec::from([head, tail]) };
-    let Some(answers) = with_closed(on, &ports, reached.stations).await? else { return Ok(Tried::NoFrame) };
+    let answers = match with_closed(on, &ports, reached.stations).await? {
+        WithClosed::Answers(answers) => answers,
+        WithClosed::NoFrame => return Ok(Tried::NoFrame),
+        WithClosed::NotClosed => return Ok(Tried::NotClosed),
+    };
     if answers.iter().enumerate().all(|(node, is)| *is != silent(node)) {
         return Ok(Tried::Right);
     }
@@ -118,32 +124,32 @@ pub(super) fn first_behind_break(nodes: &[NodeStatus], topology: &Topology, clos
     Some(first.far.node).filter(is_open)
 }
 
-/// Which SubDevices with these station addresses answer, by position, while these ports are closed; `None` if no frame
-/// returns then.
+/// What was seen while ports were closed.
+pub(super) enum WithClosed {
+    /// Which SubDevices answered, by position.
+    Answers(Vec<bool>),
+    /// No frame returned, or one of the ends was not reached.
+    NoFrame,
+    /// The ports were not closed: one is closed already, or they are being set by the application or another program.
+    NotClosed,
+}
+
+/// Which SubDevices with these station addresses answer while these ports are closed for a moment.
 pub(super) async fn with_closed(
     (bus, segment): (&Bus, &SharedSegment),
     ports: &[PortOf],
     stations: &[StationAddress],
-) -> Result<Option<Vec<bool>>, BusError> {
+) -> Result<WithClosed, BusError> {
     let of = |port: &PortOf| stations.get(port.node).map(|station| (*station, port.port));
     let ports: Vec<(StationAddress, u8)> = ports.iter().filter_map(of).collect();
-    let mut before = Vec::new();
-    for (station, _) in &ports {
-        before.push((*station, lasting(bus, *station).await?));
-    }
-    // The model keeps the settings: a scan or a stop that begins meanwhile restores them.
-    segment.observe(Observation::PortsAltered(&before));
-    let close = before.iter().map(|(station, control)| (*station, closed_at(*control, *station, &ports)));
-    let result = match write(bus, close.collect()).await {
-        Ok(()) => answering(bus, stations).await,
-        Err(error) => Err(error),
-    };
-    if result.is_err() || write(bus, before).await.is_err() {
+    let Ok(before) = controls(bus, segment, &ports).await else { return Ok(WithClosed::NotClosed) };
+    let (result, is_restored) = while_closed(bus, segment, &before, &ports, answering(bus, stations)).await;
+    let result = result.and_then(|answers| answers);
+    if result.is_err() || !is_restored {
         // Frames were lost, or one of the two SubDevices does not answer: the settings expire.
         bus.sleep(TEMPORARY).await;
     }
-    segment.observe(Observation::PortsAltered(&[]));
-    Ok(result.ok())
+    Ok(result.map_or(WithClosed::NoFrame, WithClosed::Answers))
 }
 
 /// Which SubDevices answer, by position.

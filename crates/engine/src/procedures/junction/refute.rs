@@ -6,7 +6,7 @@
 //! only one end has communication there is no cable between the two. If neither has, the closing cable may be broken;
 //! such a ring is accepted without a test.
 //!
-//! A segment that changes during the test gives no result, and a negative result is tested again.
+//! A segment that changes during the test gives no result: it is tested again. So is a negative result.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -14,7 +14,7 @@ use core::time::Duration;
 use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::{DlStatus, map};
 
-use super::learn::{Reached, first_behind_break, with_closed};
+use super::learn::{Reached, WithClosed, first_behind_break, with_closed};
 use crate::junction::ClosingEvidence;
 use crate::order::InOrder;
 use crate::procedures::shared_segment::SharedSegment;
@@ -22,27 +22,57 @@ use crate::supervisor::Bus;
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 
 /// Consecutive negative results that are required.
-const TRIES: usize = 2;
-/// Scans until all SubDevices answer.
+const NEGATIVES: usize = 2;
+/// Tests of a segment that changes during each.
+const TESTS: usize = 5;
+/// Scans until all SubDevices answer, and until all ports are open again.
 const SCANS: u8 = 5;
 const PAUSE: Duration = Duration::from_millis(2);
 
-/// The number of a closing cable that is not where it was declared, and the evidence.
+/// Result of a test of connections.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Refuted {
+    /// All closing cables are where they were declared, or broken.
+    None,
+    /// The closing cable with this number is not, and the evidence.
+    Closing(usize, ClosingEvidence),
+    /// The segment changed during each test, or it is in use by a scan or an application by now.
+    NotTested,
+}
+
+/// Whether a closing cable is not where it was declared.
 pub(crate) async fn refute(
-    on @ (bus, _): (&Bus, &SharedSegment),
+    on @ (bus, segment): (&Bus, &SharedSegment),
     scanned: Reached<'_>,
     main_count: usize,
     closings: &[Closing],
-) -> Option<(usize, ClosingEvidence)> {
-    let mut last = None;
-    for _ in 0..TRIES {
-        let nodes = present_ports(bus, scanned).await?;
-        last = Some(attempt(on, Reached { nodes: &nodes, ..scanned }, main_count, closings).await?);
-        if present_ports(bus, scanned).await? != nodes {
-            return None;
+) -> Refuted {
+    let scan = segment.view().scan_number();
+    let mut negatives = 0;
+    for _ in 0..TESTS {
+        let is_in_use = {
+            let view = segment.view();
+            view.is_active() || view.is_scanning() || view.scan_number() != scan
+        };
+        if is_in_use {
+            break;
+        }
+        let Some(nodes) = present_ports(bus, scanned).await else { continue };
+        let tested = attempt(on, Reached { nodes: &nodes, ..scanned }, main_count, closings).await;
+        if !are_ports_as(bus, scanned, &nodes).await {
+            negatives = 0;
+            continue;
+        }
+        match tested {
+            Refuted::None => return Refuted::None,
+            Refuted::Closing(..) => negatives += 1,
+            Refuted::NotTested => {}
+        }
+        if negatives == NEGATIVES {
+            return tested;
         }
     }
-    last
+    Refuted::NotTested
 }
 
 async fn attempt(
@@ -50,7 +80,7 @@ async fn attempt(
     Reached { nodes, stations }: Reached<'_>,
     main_count: usize,
     closings: &[Closing],
-) -> Option<(usize, ClosingEvidence)> {
+) -> Refuted {
     let topology = Topology::with_local_rings(nodes, main_count, closings);
     let mut numbers: Vec<usize> = (0..closings.len()).collect();
     // Which SubDevices are behind a break depends on the inner rings.
@@ -66,8 +96,10 @@ async fn attempt(
         let broken = if linked.len() == 2 { first_behind_break(nodes, &topology, closing) } else { None };
         let silent = |node: usize| broken.is_some_and(|first| topology.is_behind(node, first));
         let ports = if broken.is_some() { &linked[..1] } else { &linked[..] };
-        let shown = match with_closed(on, ports, stations).await.ok()? {
-            Some(answers) => {
+        let shown = match with_closed(on, ports, stations).await {
+            Err(_) | Ok(WithClosed::NotClosed) => return Refuted::NotTested,
+            Ok(WithClosed::NoFrame) => ClosingEvidence::NoFrame,
+            Ok(WithClosed::Answers(answers)) => {
                 let odd = answers.iter().enumerate().find(|(node, answers)| **answers == silent(*node));
                 match odd.map(|(node, answers)| (node, *answers)) {
                     Some((node, false)) => ClosingEvidence::CutOff { position: Position(node as u16) },
@@ -75,11 +107,21 @@ async fn attempt(
                     None => continue,
                 }
             }
-            None => ClosingEvidence::NoFrame,
         };
-        return Some((number, shown));
+        return Refuted::Closing(number, shown);
     }
-    None
+    Refuted::None
+}
+
+/// Whether all ports are as before; ports that were opened again may take a moment.
+async fn are_ports_as(bus: &Bus, scanned: Reached<'_>, before: &[NodeStatus]) -> bool {
+    for _ in 0..SCANS {
+        if present_ports(bus, scanned).await.is_some_and(|now| now == before) {
+            return true;
+        }
+        bus.sleep(PAUSE).await;
+    }
+    false
 }
 
 /// Present port states; `None` if not all SubDevices answer.

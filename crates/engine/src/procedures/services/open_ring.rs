@@ -9,14 +9,14 @@ use ringcat_wire::register::{DlStatus, map};
 
 use crate::link::LinkSet;
 use crate::procedures::idle::{are_ports_as_scanned, without_watch};
-use crate::procedures::loops::{CLOSING_LIMIT, controls, until_ring_is_closed, while_closed};
+use crate::procedures::loops::{controls, until_expired, until_ring_is_closed, while_closed};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::ring::RingState;
 use crate::segment::Segment;
 use crate::supervisor::Bus;
 
-/// Maximum wait until an opened ring of two links is seen closed again: broadcasts pause meanwhile, and a ring that
-/// broke has to be noticed soon.
+/// Maximum wait until an opened ring of two links whose ports are open again is seen closed: broadcasts pause meanwhile,
+/// and a ring that broke has to be noticed soon.
 const CLOSING: Duration = Duration::from_millis(50);
 
 /// Rings that are opened.
@@ -72,11 +72,12 @@ async fn close_ports<T>(
     }
     let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
     let (result, is_restored) = while_closed(bus, segment, &before, ports, work).await;
-    match is_restored {
-        true if is_closed => until_ring_is_closed(bus, CLOSING).await,
-        true => {}
+    if !is_restored {
         // A port that is out of reach opens by itself. Until then SubDevices behind it would count as removed.
-        false => until_ring_is_closed(bus, CLOSING_LIMIT).await,
+        until_expired(bus, before.iter().map(|(station, _)| *station)).await;
+    }
+    if is_closed {
+        until_ring_is_closed(bus, CLOSING).await;
     }
     result.ok()
 }

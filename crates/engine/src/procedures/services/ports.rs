@@ -15,7 +15,7 @@ use crate::procedures::loops::{LOOPS, lasting};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::ring::RingState;
 use crate::segment::Observation;
-use crate::supervisor::{Bus, BusError};
+use crate::supervisor::Bus;
 
 /// The loop control of a port.
 pub async fn read(bus: &Bus, station: StationAddress, port: u8) -> Result<LoopControl, ServiceError> {
@@ -41,9 +41,9 @@ pub async fn set(
     Ok(())
 }
 
-async fn lasting_loops(bus: &Bus, station: StationAddress) -> Result<u8, BusError> {
-    let [_, loops, ..] = lasting(bus, station).await?.encode();
-    Ok(loops)
+async fn lasting_loops(bus: &Bus, station: StationAddress) -> Result<u8, ServiceError> {
+    let control = lasting(bus, station).await?.ok_or(ServiceError::Unsteady)?;
+    Ok(control.encode()[1])
 }
 
 const fn check(port: u8) -> Result<(), ServiceError> {
