@@ -18,6 +18,7 @@ mod order;
 mod process_data;
 mod properties;
 mod replugged;
+mod signals;
 mod unlisted;
 mod written;
 

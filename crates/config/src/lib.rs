@@ -17,6 +17,7 @@ mod ip;
 #[cfg(feature = "network")]
 pub mod network;
 mod object_names;
+mod pdo_list;
 mod xml;
 
 pub use compare::{DeclaredPdos, Difference, DifferenceKind, FoundNetwork, Stated, StatedSyncManager};

@@ -14,6 +14,7 @@ use super::difference::{Difference, DifferenceKind, Stated};
 use super::modules;
 use super::process_data;
 use super::properties::{self, buffers, words};
+use super::signals;
 
 /// A SubDevice of the file and the one that was found.
 pub(super) struct Both<'a> {
@@ -61,6 +62,9 @@ impl Both<'_> {
         for (kind, prevents_op, text) in properties::differences(declared, stated, info) {
             add(kind, prevents_op, text);
         }
+        for text in signals::differences(declared, info) {
+            add(DifferenceKind::Clocks, true, text);
+        }
         let (prevents_op, texts) = modules::differences(declared, self.modules);
         for text in texts {
             add(DifferenceKind::Modules, prevents_op, text);
@@ -106,14 +110,18 @@ impl Both<'_> {
     }
 
     /// Appends the differences of the process data, by SyncManager; for a SubDevice with modules, only those of PDOs
-    /// that both sides describe.
+    /// that both sides describe, and process data that an ENI leaves out.
     fn process_data(&self, differences: &mut Vec<Difference>) {
         let (declared, info) = (self.declared, self.info);
         let is_modular = assignment::names_modules(declared) || self.stated.is_some_and(|stated| stated.modular);
-        let (mut unfit, assigned) = match is_modular {
-            true => Default::default(),
-            false => (process_data::unfit(declared, info), assignment::differences(declared, info)),
-        };
+        let mut unfit = process_data::unfit(declared, info);
+        let mut assigned = Vec::new();
+        if is_modular {
+            // Its SII describes none of its modules: only what an ENI does not have at all.
+            unfit.retain(|_, lengths| lengths.is_left_out());
+        } else {
+            assigned = assignment::differences(declared, info);
+        }
         let mut named = BTreeSet::new();
         let mut add = |sync_manager: u8, text: String, prevents_op: bool| {
             named.insert(sync_manager);
@@ -136,7 +144,10 @@ impl Both<'_> {
         unfit.retain(|sync_manager, _| !named.contains(sync_manager));
         for (sync_manager, lengths) in unfit {
             let text = format!("SM {sync_manager}: {lengths}");
-            differences.push(self.difference(DifferenceKind::Pdos, true, text));
+            // Without modules it may have no process data.
+            let has_modules = || self.modules.is_some_and(|list| list.iter().any(|ident| *ident != 0));
+            let prevents_op = !is_modular || lengths.is_written || has_modules();
+            differences.push(self.difference(DifferenceKind::Pdos, prevents_op, text));
         }
     }
 

@@ -22,6 +22,15 @@ pub(super) struct Lengths {
     pub(super) own: u16,
     /// Why.
     reason: Reason,
+    /// Whether start-up commands of the file leave them.
+    pub(super) is_written: bool,
+}
+
+impl Lengths {
+    /// Whether the file does not have the process data.
+    pub(super) fn is_left_out(&self) -> bool {
+        self.reason == Reason::LeftOut
+    }
 }
 
 /// Why a SubDevice has another length than declared.
@@ -31,16 +40,19 @@ enum Reason {
     Fixed,
     /// The start-up commands of the file write them.
     Written,
+    /// An ENI has no commands that write them.
+    Unwritten,
     /// The file does not have the SyncManager, or has it without a length.
     LeftOut,
 }
 
 impl fmt::Display for Lengths {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Lengths { declared, own, reason } = self;
+        let Lengths { declared, own, reason, .. } = self;
         let reason = match reason {
             Reason::Fixed => ": the PDOs of the SubDevice cannot be written",
             Reason::Written => " with the PDOs that the start-up commands leave",
+            Reason::Unwritten => " with the PDOs of the SubDevice: the file does not write them",
             Reason::LeftOut => ": the file has no process data for it",
         };
         write!(f, "expected a length of {declared}, got {own}{reason}")
@@ -57,6 +69,8 @@ pub(super) fn unfit(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> BTreeMa
     };
     let has_dictionary = info.protocols.coe() && info.mailbox.is_some();
     let written = has_dictionary.then(|| Written::by(declared, info, &wanted.process_data));
+    // The tables of a network file are written.
+    let is_unwritten = declared.declared.is_some() && written.as_ref().is_some_and(|it| !it.is_refused());
     let of_file = |number: &u8| declared.pdos.iter().flatten().any(|it| it.sync_manager == *number);
     let is_exchanged =
         |area: &&AreaPlan| area.pdos.is_empty() || !area.pdos.iter().all(|pdo| is_virtual(pdo.index, info));
@@ -81,10 +95,12 @@ pub(super) fn unfit(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> BTreeMa
         let reason = match is_written {
             _ if length == 0 && declared.declared.is_some() => Reason::LeftOut,
             Some(true) => Reason::Written,
+            Some(false) if is_unwritten => Reason::Unwritten,
             _ => Reason::Fixed,
         };
         if let Some(own) = held.filter(|held| *held != length) {
-            unfit.insert(number, Lengths { declared: length, own, reason });
+            let is_written = is_written == Some(true);
+            unfit.insert(number, Lengths { declared: length, own, reason, is_written });
         }
     }
     unfit

@@ -9,6 +9,8 @@ use ringcat_engine::config::{SdoDownload, StartupAction, StartupCommand, SubDevi
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_wire::mailbox::coe::pdo_objects::{ASSIGNMENT_BASE, is_mapping, is_of_pdos};
 
+use crate::pdo_list::PdoList;
+
 /// Whether a SubDevice permits to write assignment and mapping. An SII without CoE details contains no information
 /// about them.
 fn permits(info: &SubDeviceInfo) -> (bool, bool) {
@@ -34,15 +36,17 @@ fn download(command: &StartupCommand) -> Option<&SdoDownload> {
 /// The objects that were written.
 pub(super) struct Written<'a> {
     info: &'a SubDeviceInfo,
-    objects: BTreeMap<u16, List>,
+    objects: BTreeMap<u16, PdoList>,
     /// Those that a start-up command wrote last.
     by_commands: BTreeSet<u16>,
+    /// Whether a write is not permitted.
+    is_refused: bool,
 }
 
 impl<'a> Written<'a> {
     /// The objects when SAFEOP is requested. `areas` are planned from the declaration.
     pub(super) fn by(declared: &SubDeviceConfig, info: &'a SubDeviceInfo, areas: &[AreaPlan]) -> Written<'a> {
-        let mut written = Written { info, objects: BTreeMap::new(), by_commands: BTreeSet::new() };
+        let mut written = Written { info, objects: BTreeMap::new(), by_commands: BTreeSet::new(), is_refused: false };
         let at = |transition| declared.startup.iter().filter(move |command| command.transition == transition);
         let (after, before): (Vec<_>, Vec<_>) = at(Transition::Ps).partition(|command| command.is_after_pdos());
         at(Transition::Ip).chain(before).filter_map(download).for_each(|download| written.write(download));
@@ -61,9 +65,10 @@ impl<'a> Written<'a> {
             let own = ASSIGNMENT_BASE + u16::from(area.sync_manager);
             let fixed: BTreeSet<u16> = assignment.pdos.iter().filter(|pdo| pdo.fixed).map(|pdo| pdo.index).collect();
             let mappings = area.pdos.iter().filter(|pdo| can_map && !fixed.contains(&pdo.index));
-            let mappings = mappings
-                .map(|pdo| (pdo.index, List::new(pdo.entries.iter().map(|entry| entry.bit_length.into()).collect())));
-            let pdos = can_assign.then(|| (own, List::new(area.pdos.iter().map(|pdo| pdo.index.into()).collect())));
+            let mappings = mappings.map(|pdo| {
+                (pdo.index, PdoList::new(pdo.entries.iter().map(|entry| entry.bit_length.into()).collect()))
+            });
+            let pdos = can_assign.then(|| (own, PdoList::new(area.pdos.iter().map(|pdo| pdo.index.into()).collect())));
             for (object, list) in mappings.chain(pdos) {
                 self.objects.insert(object, list);
                 self.by_commands.remove(&object);
@@ -96,6 +101,11 @@ impl<'a> Written<'a> {
         u16::try_from(bits.div_ceil(8)).ok().map(|bytes| (bytes, is_written))
     }
 
+    /// Whether commands write objects that the SubDevice does not permit to write.
+    pub(super) fn is_refused(&self) -> bool {
+        self.is_refused
+    }
+
     fn assigned(&self, sync_manager: u8) -> impl Iterator<Item = u32> {
         self.info.assigned_pdos(sync_manager).map(|pdo| u32::from(pdo.index))
     }
@@ -105,14 +115,14 @@ impl<'a> Written<'a> {
         let (can_assign, can_map) = permits(self.info);
         let is_permitted = if is_mapping(index) { can_map } else { can_assign };
         if !is_permitted {
+            self.is_refused = true;
             return;
         }
-        let size = if is_mapping(index) { 4 } else { 2 };
         let list = match self.objects.remove(&index) {
             Some(list) => list,
-            None => List::new(self.described(index)),
+            None => PdoList::new(self.described(index)),
         };
-        self.objects.insert(index, list.with(download, size));
+        self.objects.insert(index, list.with(download));
         self.by_commands.insert(index);
     }
 
@@ -124,42 +134,5 @@ impl<'a> Written<'a> {
         }
         let entries = self.info.pdo(index).into_iter().flat_map(|pdo| &pdo.entries);
         entries.map(|entry| u32::from(entry.bit_length)).collect()
-    }
-}
-
-/// An object with a count at subindex 0.
-struct List {
-    count: u8,
-    /// By subindex.
-    entries: BTreeMap<u8, u32>,
-}
-
-impl List {
-    fn new(described: Vec<u32>) -> List {
-        let count = u8::try_from(described.len()).unwrap_or(u8::MAX);
-        List { count, entries: (1..=u8::MAX).zip(described).collect() }
-    }
-
-    /// After a write; entries have `size` bytes.
-    fn with(mut self, download: &SdoDownload, size: usize) -> List {
-        let SdoDownload { sub_index, complete_access, data, .. } = download;
-        let mut rest = &data[..];
-        if *sub_index == 0 {
-            let Some(count) = rest.first() else { return self };
-            self.count = *count;
-            // With complete access the count has 16 bits.
-            rest = rest.get(2..).unwrap_or_default();
-        }
-        let last = if *complete_access { u8::MAX } else { *sub_index };
-        for (sub, bytes) in ((*sub_index).max(1)..=last).zip(rest.chunks_exact(size)) {
-            let value = bytes.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte));
-            self.entries.insert(sub, value);
-        }
-        self
-    }
-
-    /// The entries that count; `None` if one is not known.
-    fn values(&self) -> Option<Vec<u32>> {
-        (1..=self.count).map(|sub| self.entries.get(&sub).copied()).collect()
     }
 }

@@ -28,6 +28,10 @@ const WATCHDOG: u8 = 0x40;
 const WITHOUT_PROCESS_DATA: &str = "the file has no process data of it, and an ENI leaves none to the EEPROM: a \
                                     SubDevice with process data does not reach SAFEOP then; `ringcat init` and \
                                     `ringcat esi declare` write the tables `[[subdevice.sync_manager]]`";
+/// What the ENI of a SubDevice means that has SyncManagers, and not this one.
+const WITHOUT_TABLE: &str = "the file has no table of it, and an ENI leaves none to the EEPROM: if the SubDevice has \
+                             process data there, it does not reach SAFEOP; a table without `length` and without PDOs \
+                             declares that it has none";
 
 impl NetworkFile {
     /// The ENI of the network.
@@ -39,17 +43,26 @@ impl NetworkFile {
         let mut left_out = of_file(self);
         for (index, of) in self.subdevice.iter().enumerate() {
             let declared = declared(&configuration, index, of)?;
-            let config = &mut configuration.declaration.subdevices[index];
-            if !pdos::place(&mut config.startup, of) {
+            let placed = pdos::place(&configuration.declaration.subdevices[index].startup, of);
+            if let Some(undone) = placed.undone(&declared) {
+                return Err(ExportError::of(&configuration, index, "start-up commands", undone.to_string()));
+            }
+            if !placed.is_exact {
                 let reason = "an ENI has the commands of each protocol, and those to registers, in lists of their own: \
                               the commands that assign PDOs follow the other CoE commands without `after_pdos`";
                 left_out.push(LeftOut::new(index, "order of the start-up commands at PS", reason));
             }
+            let config = &mut configuration.declaration.subdevices[index];
+            config.startup = placed.startup;
             config.sync_managers.clear();
             config.pdos = None;
             config.declared_bootstrap = bootstrap(of);
-            if declared.iter().all(|it| it.area().is_none()) && !is_coupler(of) {
-                left_out.push(LeftOut::new(index, "sync_manager", WITHOUT_PROCESS_DATA));
+            if declared.iter().all(|it| it.area().is_none()) {
+                left_out.extend((!is_coupler(of)).then(|| LeftOut::new(index, "sync_manager", WITHOUT_PROCESS_DATA)));
+            } else {
+                let missing = without_table(&declared, of);
+                left_out
+                    .extend(missing.map(|number| LeftOut::new(index, format!("sync_manager {number}"), WITHOUT_TABLE)));
             }
             config.declared = Some(declared);
         }
@@ -83,6 +96,16 @@ fn is_coupler(of: &SubDevice) -> bool {
     let ports: Vec<char> = of.ports.chars().filter(|kind| !kind.is_whitespace()).collect();
     let has_branches = ports.len() > 2 || ports.windows(2).any(|pair| pair[0] != pair[1]);
     has_branches && of.mailbox.is_none() && of.domain.is_none() && of.sync.is_none()
+}
+
+/// SyncManagers of process data that a SubDevice may have and its file does not: those below its last one, and with
+/// mailboxes, which are SyncManagers 0 and 1, both 2 and 3 (protocol 3.11).
+fn without_table(declared: &[DeclaredSyncManager], of: &SubDevice) -> impl Iterator<Item = u8> {
+    let of_data: BTreeSet<u8> = declared.iter().filter_map(|it| Some(it.area()?.sync_manager)).collect();
+    let last = of_data.last().copied().unwrap_or_default();
+    let has_mailbox = of.mailbox.is_some() || of_data.first().is_some_and(|first| *first >= 2);
+    let possible = if has_mailbox { 2..=last.max(3) } else { 0..=last };
+    possible.filter(move |number| !of_data.contains(number))
 }
 
 /// Mailboxes that a file leaves to the EEPROM. If the file has the ports of a SubDevice, the entry comes from a scan or

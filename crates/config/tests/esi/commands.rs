@@ -150,7 +150,7 @@ fn modules_are_before_the_pdos_and_start_up_commands_after_them() {
     // A description that assigns the PDOs itself is corrected by the engine.
     let (file, _) = network(&with_commands(&(command("#x2000") + &command("#x1C12")), ""), DRIVE);
     assert_eq!(declared(&file), [(0xF030, false), (0x2000, false), (0x1C12, false), (0x6060, false)]);
-    assert_eq!(exported(&file), [0xF030, 0x2000, 0x1C12, 0x6060]);
+    assert_eq!(exported(&file), [0xF030, 0x2000, 0x1C12, 0x6060, 0x1C12, 0x1C13, 0x1C12, 0x1C13]);
 }
 
 // covers: esi-declare, ES-47, ES-125, eni-run

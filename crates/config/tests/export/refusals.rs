@@ -1,7 +1,7 @@
 //! What an ENI cannot express: refused with SubDevice, setting and reason, or listed.
 
-use ringcat_config::network::model::{Startup, Target};
-use ringcat_config::network::{NetworkFile, Time};
+use ringcat_config::network::model::{Sdo, Startup, SubDevice, SyncManager, Target};
+use ringcat_config::network::{Bytes, NetworkFile, Time};
 use ringcat_config::{Configuration, ExportDetails, ExportOptions, export};
 use ringcat_engine::config::{RegisterAccess, RegisterCommand, StartupAction, StartupCommand, Transition};
 use ringcat_wire::address::RegisterAddress;
@@ -116,6 +116,72 @@ fn mailboxes_left_to_the_eeprom_are_listed_if_a_subdevice_may_need_one() {
     let registers = |it: &Startup| it.write.is_some() || it.check.is_some();
     file.subdevice[1].startup.retain(registers);
     assert_eq!(listed(&file), [], "commands to registers need none");
+}
+
+/// One of several tables was removed.
+// covers: eni-run
+#[test]
+fn a_sync_manager_without_a_table_beside_others_is_listed() {
+    let listed = |file: &NetworkFile| -> Vec<(Option<usize>, String)> {
+        let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        let left_out = export.left_out.into_iter().filter(|it| it.what.starts_with("sync_manager "));
+        left_out.map(|it| (it.subdevice, it.what)).collect()
+    };
+    let one = |number: u8| vec![(Some(DRIVE), format!("sync_manager {number}"))];
+    let file = network(CELL);
+    assert_eq!(file.subdevice[DRIVE].sync_manager.iter().map(|it| it.number).collect::<Vec<_>>(), [2, 3]);
+    assert_eq!(listed(&file), []);
+    for (at, number) in [(0, 2), (1, 3)] {
+        let mut file = network(CELL);
+        file.subdevice[DRIVE].sync_manager.remove(at);
+        assert_eq!(listed(&file), one(number));
+        // Without the mailbox, the numbers show it.
+        file.subdevice[DRIVE].mailbox = None;
+        assert_eq!(listed(&file), one(number));
+        // A table without a length and without PDOs declares that there is none; a length of 0 leaves it to the EEPROM.
+        for (length, expected) in [(None, vec![]), (Some(0), one(number))] {
+            let mut file = network(CELL);
+            let table = &mut file.subdevice[DRIVE].sync_manager[at];
+            (table.length, table.pdo) = (length, Vec::new());
+            assert_eq!(listed(&file), expected);
+        }
+    }
+    let mut file = network(CELL);
+    let drive = file.subdevice[DRIVE].sync_manager[0].clone();
+    let without_mailbox = |it: &&mut SubDevice| it.mailbox.is_none() && it.sync_manager.len() == 1;
+    let terminal = file.subdevice.iter_mut().find(without_mailbox).expect("a simple terminal");
+    let number = terminal.sync_manager[0].number;
+    assert_eq!(number, 0);
+    terminal.sync_manager.push(SyncManager { number: 2, ..drive });
+    let [(Some(_), what)] = &listed(&file)[..] else { panic!("{:?}", listed(&file)) };
+    assert_eq!(what, "sync_manager 1");
+}
+
+/// Sent after the PDOs, the commands undo the tables.
+// covers: eni-run, ES-125
+#[test]
+fn start_up_commands_that_leave_other_process_data_than_the_tables_are_refused() {
+    let mut file = network(CELL);
+    let sdo = Sdo { index: 0x1C13, data: Bytes(vec![0]), ..Sdo::default() };
+    let command = Startup { sdo: Some(sdo), after_pdos: true, ..Startup::default() };
+    file.subdevice[DRIVE].startup.push(command.clone());
+    let bytes = file.subdevice[DRIVE].sync_manager[1].pdo.iter().flat_map(|pdo| pdo.entries.iter().flatten());
+    let bytes = bytes.map(|entry| u32::from(entry.bits)).sum::<u32>() / 8;
+    let text = format!(
+        "SubDevice 1 \"Drive\": start-up commands: they leave 0 bytes in the PDOs of SyncManager 3, its table has \
+         {bytes}: the SubDevice refuses SAFEOP"
+    );
+    let refused = file.to_eni(&ExportOptions::default()).expect_err("the drive refuses SAFEOP");
+    assert_eq!(refused.to_string(), text);
+    file.subdevice[DRIVE].startup.pop();
+    file.subdevice[DRIVE].startup.insert(0, Startup { after_pdos: false, ..command });
+    let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let written = configured(&export.text).declaration.subdevices[DRIVE].startup.clone();
+    let written = written.iter().filter_map(|command| match &command.action {
+        StartupAction::Sdo(it) if (it.index, it.sub_index) == (0x1C13, 0) => Some(it.data.clone()),
+        _ => None,
+    });
+    assert_eq!(written.collect::<Vec<_>>(), [[0], [0], [1]], "the PDOs of the table are written after it");
 }
 
 /// Ports and a mailbox do not show whether a SubDevice has process data. Couplers and junctions have none.

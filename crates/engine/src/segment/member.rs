@@ -1,6 +1,8 @@
 //! The state of a SubDevice declared by the application: its phase, its target, its incidents.
 
+use alloc::collections::VecDeque;
 use alloc::rc::Rc;
+use alloc::string::String;
 use core::ops::Deref;
 use core::time::Duration;
 
@@ -57,6 +59,29 @@ pub struct Member {
     pub repair: Repair,
     /// Requests for another attempt without a further pause.
     pub retries: u32,
+    /// Differences that were reported.
+    pub(super) oddities: Oddities,
+}
+
+/// Differences to keep at most: more than a SubDevice has SyncManagers.
+const MAX_ODDITIES: usize = 32;
+
+/// Differences between a declaration and a SubDevice: each attempt finds them again, and each is reported once.
+#[derive(Debug, Default)]
+pub(super) struct Oddities(VecDeque<String>);
+
+impl Oddities {
+    /// Whether a difference is not yet reported. The oldest are forgotten.
+    pub fn is_new(&mut self, what: &str) -> bool {
+        if self.0.iter().any(|other| other == what) {
+            return false;
+        }
+        if self.0.len() == MAX_ODDITIES {
+            self.0.pop_front();
+        }
+        self.0.push_back(what.into());
+        true
+    }
 }
 
 /// First pause before the SubDevice at the address of a lost member is identified again.
@@ -168,6 +193,7 @@ impl Member {
             mistaken: Mistaken::default(),
             repair: Repair::default(),
             retries: 0,
+            oddities: Oddities::default(),
         }
     }
 }

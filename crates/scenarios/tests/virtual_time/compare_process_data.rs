@@ -121,6 +121,14 @@ fn the_pdos_that_the_commands_of_an_eni_leave_have_to_fill_the_syncmanager() {
     let text = "position 0 \"servo (1001)\": SM 2: expected a length of 14, got 12 with the PDOs that the start-up \
                 commands leave";
     assert_eq!(differences[0].text, text);
+    // Without commands the SubDevice has its own PDOs.
+    let text = longer.iter().fold(exported(&file), |text, (from, to)| text.replace(from, to));
+    let (begin, end) = (text.find("<CoE>").expect("commands"), text.find("</CoE>").expect("their end"));
+    let differences = of_eni(&format!("{}{}", &text[..begin], &text[end + "</CoE>".len()..]), "servo");
+    assert_eq!(kinds(&differences), [(Pdos, true)]);
+    let text = "position 0 \"servo (1001)\": SM 2: expected a length of 14, got 12 with the PDOs of the SubDevice: the \
+                file does not write them";
+    assert_eq!(differences[0].text, text);
     // A SyncManager that is disabled, and whose PDOs the commands assign.
     let disabled = replaced(&file, &[("00110c0064000100", "00110c0064000000")], "servo");
     assert_eq!(kinds(&disabled), [(Pdos, true)]);
@@ -129,6 +137,40 @@ fn the_pdos_that_the_commands_of_an_eni_leave_have_to_fill_the_syncmanager() {
     let (head, count) = text.split_once("set count of sm pdos (0x1c13)").expect("the command");
     let text = format!("{head}set count of sm pdos (0x1c13){}", count.replacen("<Data>01", "<Data>00", 1));
     assert_eq!(kinds(&of_eni(&text, "servo")), [(Pdos, true)]);
+}
+
+/// The engine reads the assignment after the commands, and corrects it; another MainDevice has the commands of the ENI.
+// covers: network-file, eni-run, ES-125
+#[test]
+fn an_eni_has_the_pdos_of_the_tables_where_start_up_commands_write_others() {
+    let commands = [
+        ("no PDO", vec![write(0x1C13, 0, &[0])]),
+        ("a missing entry", vec![write(0x1C12, 0, &[0]), write(0x1600, 0, &[0]), write(0x1600, 0, &[1])]),
+        (
+            "another mapping",
+            vec![
+                write(0x1C12, 0, &[0]),
+                write(0x1600, 0, &[0]),
+                write(0x1600, 1, &[16, 0, 0x40, 0x60]),
+                write(0x1600, 0, &[1]),
+                write(0x1C12, 1, &[0, 0x16]),
+                write(0x1C12, 0, &[1]),
+            ],
+        ),
+    ];
+    for (what, commands) in commands {
+        let file = file_of("servo", |file| file.subdevice[0].startup = commands.clone());
+        assert_eq!(of_file(file.clone(), "servo"), [], "{what}");
+        assert_eq!(kinds(&of_eni(&exported(&file), "servo")), [], "{what}");
+        // Sent after the PDOs, the commands undo the tables: a run does not reach OP, and an ENI is refused.
+        let undone = file_of("servo", |file| {
+            let after = |command: &Startup| Startup { after_pdos: true, ..command.clone() };
+            file.subdevice[0].startup = commands.iter().map(after).collect();
+        });
+        assert_eq!(of_file(undone.clone(), "servo"), [(Pdos, true)], "{what}");
+        let refused = undone.to_eni(&ExportOptions::default()).expect_err(what).to_string();
+        assert!(refused.contains("\"servo\"") && refused.contains("start-up command"), "{what}: {refused}");
+    }
 }
 
 /// The commands write the assignment; the mapping is that of the SII.

@@ -381,3 +381,58 @@ fn an_eni_of_a_file_without_revisions_and_identities_has_no_difference() {
         assert_eq!(checked_of(&eni.configuration, &eni.stated(), LINE, &[]), []);
     }
 }
+
+/// The description of modules is not in an SII; that the ENI has no SyncManager is a difference nevertheless.
+// covers: network-file, eni-run, ES-69
+#[test]
+fn process_data_that_an_eni_does_not_have_of_a_subdevice_with_modules_is_named() {
+    let bus = with_modules("\"0x00010001\"");
+    for (left, names) in [(0, &[2, 3][..]), (1, &[3])] {
+        let network = file_of(&bus, |file| {
+            file.subdevice[0].startup = commands(&MODULES[..1], false);
+            file.subdevice[0].sync_manager.truncate(left);
+        });
+        let by_file = checked_of(&network.configuration, &network.stated(), &bus, &listed(&bus));
+        assert_eq!(by_file, [], "the SubDevice has it");
+        let export = network.file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        let eni = EniFile::from_bytes(export.text.as_bytes()).unwrap_or_else(|error| panic!("{error}"));
+        let by_eni = checked_of(&eni.configuration, &eni.stated(), &bus, &listed(&bus));
+        let sync_managers = by_eni.iter().map(|it| it.text.split_once("SM ").expect("a SyncManager").1);
+        let sync_managers: Vec<String> = sync_managers.map(|text| text[..1].to_owned()).collect();
+        assert_eq!(sync_managers, names.iter().map(i32::to_string).collect::<Vec<_>>(), "{by_eni:#?}");
+        assert!(by_eni.iter().all(|it| it.text.ends_with("the file has no process data for it")), "{by_eni:#?}");
+        // Without its list of modules, nothing shows that it has process data.
+        let (_, scan) = scanned(&bus, &Options::default());
+        let found = FoundNetwork::new(&scan.subdevices, &scan.topology);
+        let unknown = eni.configuration.differences(found, &eni.stated());
+        assert_eq!(unknown.iter().map(|it| it.prevents_op).collect::<Vec<_>>(), vec![false; names.len()]);
+    }
+}
+
+// covers: network-file, dc-sync, ES-60
+#[test]
+fn sync_signals_of_none_of_its_modes_and_a_cycle_of_0_prevent_op() {
+    let none = |word: &str| {
+        format!(
+            "position 2 \"servo\": AssignActivate {word} activates SYNC signals of none of its modes (0x0000, 0x0300, \
+             0x0700)"
+        )
+    };
+    let no_cycle = "position 2 \"servo\": its SYNC signals need a cycle of SYNC0, the file has 0".to_owned();
+    for (word, cycle, expected) in [
+        (0x0300, 1_000_000, None),
+        (0x0700, 1_000_000, None),
+        (0x0000, 0, None),
+        (0x0300, 0, Some(no_cycle)),
+        (0x0500, 1_000_000, Some(none("0x0500"))),
+        (0x0100, 1_000_000, Some(none("0x0100"))),
+    ] {
+        let network = file_of(LINE, |file| {
+            file.clocks = Some(Clocks::default());
+            let signals = ringcat::SyncSignals::sync0(cycle, 0).with_assign_activate(word);
+            file.subdevice[2].sync = Some(Sync::from(signals));
+        });
+        let expected = expected.map_or(Vec::new(), |text| one(OfClocks, true, &text));
+        assert_eq!(checked(&network, LINE), expected, "{word:#06x}, {cycle} ns");
+    }
+}

@@ -96,6 +96,13 @@ fn the_dictionary_has_priority_over_the_sii_which_is_reported() {
             if what == "SM 2: 2 bytes are configured, the PDOs in the dictionary have 4")
     };
     assert!(trusting.saw(trusting.beginning(), explained), "{:?}", troubles(trusting.events(trusting.beginning())));
+    // Each attempt is refused, and the difference is named once.
+    trusting.run_cycles(5000);
+    let events = trusting.events(trusting.beginning());
+    let count = |wanted: &dyn Fn(&Event) -> bool| events.iter().filter(|timed| wanted(&timed.event)).count();
+    let refused = count(&|event| matches!(event, Event::StateError { subdevice: SubDeviceId(ODD), .. }));
+    assert!(refused > 1, "{:?}", troubles(events));
+    assert_eq!(count(&explained), 1, "{:?}", troubles(events));
 }
 
 // covers: odd-sii

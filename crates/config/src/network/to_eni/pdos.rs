@@ -1,31 +1,116 @@
 //! The commands that bring the dictionary of a SubDevice to the PDOs of a file (protocol 6.3), which the engine sends
 //! where the dictionary holds others.
 
-use ringcat_engine::config::{SdoDownload, StartupAction, StartupCommand, Transition};
-use ringcat_wire::mailbox::coe::pdo_objects::{ASSIGNMENT_BASE, is_of_pdos};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::ops::Range;
+
+use ringcat_engine::config::{DeclaredSyncManager, SdoDownload, StartupAction, StartupCommand, Transition};
+use ringcat_wire::mailbox::coe::pdo_objects::{ASSIGNMENT_BASE, is_mapping, is_of_pdos};
 
 use crate::export::is_expressible;
 use crate::network::model::{Direction, Pdo, Protocol, SubDevice, SyncManager};
+use crate::pdo_list::PdoList;
+
+/// Start-up commands with those that assign and map PDOs.
+pub(super) struct Placed {
+    /// Those of the file and those of the tables, in the order of the ENI.
+    pub(super) startup: Vec<StartupCommand>,
+    /// The places of those of the tables.
+    of_tables: Range<usize>,
+    /// Whether the order is the one in which the engine sends them.
+    pub(super) is_exact: bool,
+}
 
 /// Puts them after the start-up commands of the file without `after_pdos` and before the others, as the engine sends
-/// them, unless the file has such commands itself. If an ENI cannot have this order, they directly follow the other
-/// commands of CoE, and the result is false.
-pub(super) fn place(startup: &mut Vec<StartupCommand>, of: &SubDevice) -> bool {
-    let commands = commands(startup, of);
+/// them. If an ENI cannot have this order, they directly follow the other commands of CoE.
+pub(super) fn place(startup: &[StartupCommand], of: &SubDevice) -> Placed {
+    let commands = commands(of);
     if commands.is_empty() {
-        return true;
+        return Placed { startup: startup.to_vec(), of_tables: 0..0, is_exact: true };
     }
-    let with = |list: &[StartupCommand], place: usize| [&list[..place], &commands[..], &list[place..]].concat();
-    let mut sorted = startup.clone();
+    let with = |list: &[StartupCommand], place: usize| Placed {
+        startup: [&list[..place], &commands[..], &list[place..]].concat(),
+        of_tables: place..place + commands.len(),
+        is_exact: false,
+    };
+    let mut sorted = startup.to_vec();
     sorted.sort_by_key(StartupCommand::is_after_pdos);
     let before = sorted.iter().position(StartupCommand::is_after_pdos).unwrap_or(sorted.len());
     let exact = with(&sorted, before);
-    let is_exact = is_expressible(&exact);
+    let is_exact = is_expressible(&exact.startup);
     let last = |list: &[StartupCommand]| list.iter().rposition(is_coe_before).map_or(0, |last| last + 1);
-    let others = [with(&sorted[..], last(&sorted)), with(startup, last(startup))];
-    *startup = others.into_iter().find(|list| !is_exact && is_expressible(list)).unwrap_or(exact);
-    startup.iter_mut().for_each(|command| command.after_pdos = false);
-    is_exact
+    let others = [with(&sorted, last(&sorted)), with(startup, last(startup))];
+    let other = others.into_iter().find(|it| !is_exact && is_expressible(&it.startup));
+    let mut placed = other.unwrap_or(Placed { is_exact, ..exact });
+    placed.startup.iter_mut().for_each(|command| command.after_pdos = false);
+    placed
+}
+
+impl Placed {
+    /// A SyncManager whose PDOs have another length than its table when SAFEOP is requested, because of commands of the
+    /// file: the SubDevice refuses SAFEOP. `None` where a PDO is not known.
+    pub(super) fn undone(&self, declared: &[DeclaredSyncManager]) -> Option<Undone> {
+        let mut objects: BTreeMap<u16, (PdoList, bool)> = BTreeMap::new();
+        let sent = |transition| self.startup.iter().enumerate().filter(move |(_, it)| it.transition == transition);
+        // Without commands of tables, those behind the PDOs keep their mark.
+        let (after, at_ps): (Vec<_>, Vec<_>) = sent(Transition::Ps).partition(|(_, it)| it.is_after_pdos());
+        for (place, command) in sent(Transition::Ip).chain(at_ps).chain(after) {
+            let StartupAction::Sdo(download) = &command.action else { continue };
+            if is_of_pdos(download.index) {
+                let before = objects.remove(&download.index).map(|(list, _)| list);
+                let list = before.unwrap_or_else(|| described(download.index, declared)).with(download);
+                objects.insert(download.index, (list, !self.of_tables.contains(&place)));
+            }
+        }
+        let of_area = |it: &DeclaredSyncManager| -> Option<Undone> {
+            let expected = it.area()?.length;
+            let object = ASSIGNMENT_BASE + u16::from(it.index);
+            let list = |object: u16| objects.get(&object).map(|(list, is_own)| (list.clone(), *is_own));
+            let (assigned, mut written) = list(object).unwrap_or_else(|| (described(object, declared), false));
+            let mut bits = 0;
+            for pdo in assigned.values()? {
+                let pdo = u16::try_from(pdo).ok()?;
+                let (entries, is_own) = list(pdo).unwrap_or_else(|| (described(pdo, declared), false));
+                bits += entries.values()?.into_iter().map(|entry| entry & 0xFF).sum::<u32>();
+                written |= is_own;
+            }
+            let bytes = bits.div_ceil(8);
+            (written && bytes != u32::from(expected)).then_some(Undone { sync_manager: it.index, expected, bytes })
+        };
+        declared.iter().find_map(of_area)
+    }
+}
+
+/// A SyncManager whose PDOs start-up commands of the file change.
+pub(super) struct Undone {
+    sync_manager: u8,
+    /// Bytes of its table.
+    expected: u16,
+    /// Bytes of its PDOs.
+    bytes: u32,
+}
+
+impl fmt::Display for Undone {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Undone { sync_manager, expected, bytes } = self;
+        write!(
+            f,
+            "they leave {bytes} bytes in the PDOs of SyncManager {sync_manager}, its table has {expected}: the \
+             SubDevice refuses SAFEOP"
+        )
+    }
+}
+
+/// An assignment or a mapping as the tables have it, with the bits of the entries.
+fn described(object: u16, declared: &[DeclaredSyncManager]) -> PdoList {
+    if !is_mapping(object) {
+        let of = declared.iter().find(|it| ASSIGNMENT_BASE + u16::from(it.index) == object);
+        return of.map_or_else(PdoList::default, |it| PdoList::new(it.pdos.iter().map(|it| it.index.into()).collect()));
+    }
+    let entries = declared.iter().flat_map(|it| &it.pdos).find(|pdo| pdo.index == object);
+    let entries = entries.and_then(|pdo| pdo.entries.as_ref());
+    entries.map_or_else(PdoList::default, |of| PdoList::new(of.iter().map(|it| it.bit_length.into()).collect()))
 }
 
 /// Whether it is a command of CoE that is sent at PS before the PDOs.
@@ -34,18 +119,11 @@ fn is_coe_before(command: &StartupCommand) -> bool {
     is_coe && command.transition == Transition::Ps && !command.after_pdos
 }
 
-/// The commands that assign and map PDOs; none without CoE, and none if start-up commands write these objects.
-fn commands(startup: &[StartupCommand], of: &SubDevice) -> Vec<StartupCommand> {
+/// The commands that assign and map PDOs; none without CoE.
+fn commands(of: &SubDevice) -> Vec<StartupCommand> {
     let Some(mailbox) = of.mailbox.as_ref().filter(|mailbox| mailbox.protocols.contains(&Protocol::CoE)) else {
         return Vec::new();
     };
-    let is_own = |command: &StartupCommand| match &command.action {
-        StartupAction::Sdo(download) => is_of_pdos(download.index),
-        _ => false,
-    };
-    if startup.iter().any(is_own) {
-        return Vec::new();
-    }
     // The mapping of an assigned PDO cannot be changed.
     if !mailbox.pdo_assign {
         return Vec::new();

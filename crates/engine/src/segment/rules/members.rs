@@ -268,7 +268,11 @@ impl Segment {
                     self.observe_pdos(station, finding, effects);
                 }
             }
-            MemberFinding::Oddity(what) => effects.report(Event::PlanOddity { subdevice: SubDeviceId(index), what }),
+            MemberFinding::Oddity(what) => {
+                if member.oddities.is_new(&what) {
+                    effects.report(Event::PlanOddity { subdevice: SubDeviceId(index), what });
+                }
+            }
         }
     }
 
