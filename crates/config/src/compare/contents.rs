@@ -62,8 +62,8 @@ impl Both<'_> {
         for (kind, prevents_op, text) in properties::differences(declared, stated, info) {
             add(kind, prevents_op, text);
         }
-        for text in signals::differences(declared, info) {
-            add(DifferenceKind::Clocks, true, text);
+        for (prevents_op, text) in signals::differences(declared, info) {
+            add(DifferenceKind::Clocks, prevents_op, text);
         }
         let (prevents_op, texts) = modules::differences(declared, self.modules);
         for text in texts {
@@ -122,6 +122,8 @@ impl Both<'_> {
         } else {
             assigned = assignment::differences(declared, info);
         }
+        // Without a module of its direction it has no process data, whatever its SII says.
+        let prevents_op = |lengths: &process_data::Lengths| !is_modular || lengths.is_written;
         let mut named = BTreeSet::new();
         let mut add = |sync_manager: u8, text: String, prevents_op: bool| {
             named.insert(sync_manager);
@@ -138,15 +140,13 @@ impl Both<'_> {
             // One that the SubDevice does not describe is named with the assignment.
             let may_lack = is_modular || assigned_else.contains(&sync_manager);
             if let Some(text) = pdo_difference(pdo, info, may_lack) {
-                add(sync_manager, text, unfit.contains_key(&sync_manager));
+                add(sync_manager, text, unfit.get(&sync_manager).is_some_and(prevents_op));
             }
         }
         unfit.retain(|sync_manager, _| !named.contains(sync_manager));
         for (sync_manager, lengths) in unfit {
             let text = format!("SM {sync_manager}: {lengths}");
-            // Without modules it may have no process data.
-            let has_modules = || self.modules.is_some_and(|list| list.iter().any(|ident| *ident != 0));
-            let prevents_op = !is_modular || lengths.is_written || has_modules();
+            let prevents_op = prevents_op(&lengths);
             differences.push(self.difference(DifferenceKind::Pdos, prevents_op, text));
         }
     }

@@ -7,11 +7,14 @@ use ringcat_wire::al::AlState;
 
 /// The bits of AssignActivate that are register 0x0981: unit, SYNC0, SYNC1.
 const ACTIVATION: u16 = 0x0700;
+/// Those of the two signals: the unit alone is for latch units, and needs no cycle.
+const SIGNALS: u16 = 0x0600;
 /// Most operation modes that a message lists.
 const LISTED: usize = 8;
 
-/// The differences; none if the SII has no operation modes, or is not read as far as them.
-pub(super) fn differences(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> Vec<String> {
+/// The differences, and whether each prevents OP; none if the SII has no operation modes, or is not read as far as
+/// them. An SII whose modes have no signals at all may lack those of the description.
+pub(super) fn differences(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> Vec<(bool, String)> {
     let Some(sync) = declared.sync.filter(|sync| sync.assign_activate & ACTIVATION != 0) else { return Vec::new() };
     let is_checked = info.controller.features.dc && !info.device_emulation && !info.dc_modes.is_empty();
     if !is_checked || !matches!(declared.target, AlState::SafeOp | AlState::Op) {
@@ -24,9 +27,10 @@ pub(super) fn differences(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> V
         let listed: Vec<String> = modes.iter().take(LISTED).map(|mode| format!("{mode:#06x}")).collect();
         let more = if modes.len() > LISTED { ", ..." } else { "" };
         let (own, listed) = (sync.assign_activate, listed.join(", "));
-        texts.push(format!("AssignActivate {own:#06x} activates SYNC signals of none of its modes ({listed}{more})"));
-    } else if sync.sync0_cycle_ns == 0 {
-        texts.push("its SYNC signals need a cycle of SYNC0, the file has 0".to_owned());
+        let text = format!("AssignActivate {own:#06x} activates SYNC signals of none of its modes ({listed}{more})");
+        texts.push((modes.iter().any(|mode| mode & SIGNALS != 0), text));
+    } else if sync.assign_activate & SIGNALS != 0 && sync.sync0_cycle_ns == 0 {
+        texts.push((true, "its SYNC signals need a cycle of SYNC0, the file has 0".to_owned()));
     }
     texts
 }

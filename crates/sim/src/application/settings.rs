@@ -248,10 +248,12 @@ pub fn timing(
     let mut cycle = [0; 4];
     controller.pdi_read(map::DC_SYNC0_CYCLE, &mut cycle, now);
     let cycle_ns = u32::from_le_bytes(cycle);
-    if cycle_ns == 0 || cycle_ns < dc.minimum_cycle_ns {
+    // Latch units alone need no cycle (ES-60).
+    let has_signals = signals & 0x06 != 0;
+    if has_signals && (cycle_ns == 0 || cycle_ns < dc.minimum_cycle_ns) {
         return Err(AlStatusCode::DC_INVALID_SYNC_CYCLE_TIME);
     }
-    Ok(Some(cycle_ns))
+    Ok(has_signals.then_some(cycle_ns))
 }
 
 /// A 16-bit register through the PDI.

@@ -239,6 +239,8 @@ impl Segment {
         match finding {
             MemberFinding::Reached(state) => self.settle(index, state, effects),
             MemberFinding::Returned => {
+                // It may be another unit of its type.
+                member.oddities = Default::default();
                 member.mistaken = Mistaken::default();
                 self.post_presence(index);
                 effects.report(Event::Returned { subdevice: SubDeviceId(index) });
