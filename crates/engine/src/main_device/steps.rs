@@ -21,6 +21,7 @@ use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionError};
 use crate::procedures::idle::{are_ports_as_scanned, without_watch};
 use crate::procedures::junction::{Reached, refute};
+use crate::procedures::loops::restore_for_application;
 use crate::procedures::scan::node_status;
 use crate::role::Function;
 use crate::segment::Found;
@@ -62,12 +63,13 @@ impl MainDevice {
     }
 
     /// Before the last step, if connections were added: tests whether the rings close as declared. This takes some
-    /// frames, and about two seconds if a ring does not close there. A ring whose closing cable is open at both ends,
+    /// frames, and up to some seconds if no frame returns meanwhile. A ring whose closing cable is open at both ends,
     /// or whose SubDevices are not all present, is accepted without a test. Errors that [`MainDevice::apply`] detects
     /// are not checked here.
     ///
     /// The result is [`JunctionError::NotThere`] if a ring does not close as declared, [`JunctionError::NotTested`] if
-    /// the segment is being scanned, or read after a change, for longer than ten seconds.
+    /// the segment is being scanned, or read after a change, for longer than ten seconds, or if a scan or an application
+    /// begins meanwhile.
     pub fn start_connection_check(&mut self) -> Pending<Result<(), JunctionError>> {
         let bus = self.supervisor.bus();
         let is_permitted = self.active().is_none() && self.permit(Function::Activate).is_ok();
@@ -108,6 +110,7 @@ impl MainDevice {
         self.segment.observe_written_pdos();
         let session = self.next_session(self.supervisor.bus().now());
         let (active, segment) = self.prepare_loaded(loaded, session)?;
+        restore_for_application(&self.supervisor.bus(), &self.segment);
         self.start_procedures(segment);
         self.loaded = None;
         Ok(active)

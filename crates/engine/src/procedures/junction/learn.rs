@@ -16,7 +16,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::map;
 
 use crate::order::InOrder;
-use crate::procedures::loops::{TEMPORARY, closed_at, lasting, write};
+use crate::procedures::loops::{TEMPORARY, closed_at, lasting, restore, write};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::segment::Observation;
 use crate::supervisor::{Bus, BusError};
@@ -24,7 +24,7 @@ use crate::topology::{Closing, NodeStatus, PortOf, Topology, candidates_with};
 
 /// Maximum number of failed tests.
 const TRIES: usize = 256;
-/// Maximum number of failed tests without a returned frame: these cost [`TEMPORARY`] each.
+/// Maximum number of failed tests without a returned frame: these may cost [`TEMPORARY`] each.
 const SLOW_TRIES: usize = 16;
 
 /// SubDevices by position: their ports, and their station addresses.
@@ -131,18 +131,17 @@ pub(super) async fn with_closed(
     for (station, _) in &ports {
         before.push((*station, lasting(bus, *station).await?));
     }
-    // The model keeps the settings: a scan or a stop that begins meanwhile restores them.
+    // The model keeps the settings: a scan, a stop or an application that begins meanwhile restores them.
     segment.observe(Observation::PortsAltered(&before));
-    let close = before.iter().map(|(station, control)| (*station, closed_at(*control, *station, &ports)));
+    let close = before.into_iter().map(|(station, control)| (station, closed_at(control, station, &ports)));
     let result = match write(bus, close.collect()).await {
         Ok(()) => answering(bus, stations).await,
         Err(error) => Err(error),
     };
-    if result.is_err() || write(bus, before).await.is_err() {
+    if !restore(bus, segment).await {
         // Frames were lost, or one of the two SubDevices does not answer: the settings expire.
         bus.sleep(TEMPORARY).await;
     }
-    segment.observe(Observation::PortsAltered(&[]));
     Ok(result.ok())
 }
 
