@@ -25,7 +25,6 @@ use crate::exchange::{ClockSetup, Exchange};
 use crate::info::SubDeviceInfo;
 use crate::layout::{DomainSpec, Layout, Rules};
 use crate::procedures::error_statistics::ErrorStatistics;
-use crate::procedures::loops::restore_in_turn;
 use crate::procedures::reconcile::reconcile;
 use crate::procedures::shared_segment::{Beside, SharedSegment};
 use crate::queue::{Producer, queue};
@@ -145,20 +144,10 @@ impl MainDevice {
 
     /// Starts configuration, supervision and all other procedures of an active MainDevice.
     pub(super) fn start_procedures(&mut self, segment: SharedSegment) {
-        self.open_altered_ports(&segment);
         self.start_reconcile(segment.clone());
         segment.observe(Observation::Attached);
         self.statistics = Some(segment.statistics.clone());
         self.segment = segment;
-    }
-
-    /// A scan that the application has ended may have closed ports for a moment.
-    fn open_altered_ports(&mut self, segment: &SharedSegment) {
-        if segment.view().altered().is_empty() {
-            return;
-        }
-        let (bus, segment) = (self.supervisor.bus(), segment.clone());
-        self.supervisor.spawn(async move { restore_in_turn(&bus, &segment).await });
     }
 
     /// Number of a new session: differs from the previous one, and most probably from that of a program that ran here

@@ -21,6 +21,7 @@ use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionError};
 use crate::procedures::idle::{are_ports_as_scanned, without_watch};
 use crate::procedures::junction::{Reached, Refuted, refute};
+use crate::procedures::loops::restore_for_application;
 use crate::procedures::scan::node_status;
 use crate::role::Function;
 use crate::segment::Found;
@@ -62,7 +63,7 @@ impl MainDevice {
     }
 
     /// Before the last step, if connections were added: tests whether the rings close as declared. This takes some
-    /// frames, and about three seconds if a ring does not close there. A ring whose closing cable is open at both ends,
+    /// frames, and up to some seconds if no frame returns meanwhile. A ring whose closing cable is open at both ends,
     /// or whose SubDevices are not all present, is accepted without a test. Errors that [`MainDevice::apply`] detects
     /// are not checked here.
     ///
@@ -110,6 +111,7 @@ impl MainDevice {
         self.segment.observe_written_pdos();
         let session = self.next_session(self.supervisor.bus().now());
         let (active, segment) = self.prepare_loaded(loaded, session)?;
+        restore_for_application(&self.supervisor.bus(), &self.segment);
         self.start_procedures(segment);
         self.loaded = None;
         Ok(active)

@@ -1,7 +1,8 @@
 //! Loop settings of ports that are changed for a moment, and restored (protocol 2.2, DL control bit 1).
 //!
 //! They are restored to what the application orders by then: a port that it closes meanwhile stays closed. If the
-//! application ends meanwhile, they are restored before anything else is done; without a frame they expire.
+//! application ends meanwhile, or one begins, they are restored before anything else is done; without a frame they
+//! expire.
 
 use alloc::format;
 use alloc::string::{String, ToString};
@@ -171,11 +172,18 @@ pub(crate) async fn restore(bus: &Bus, segment: &SharedSegment) -> bool {
     is_restored
 }
 
-/// Restores ports that a scan had closed when an application ended it. Procedures of the application that close ports
-/// wait for it.
-pub(crate) async fn restore_in_turn(bus: &Bus, segment: &SharedSegment) {
-    let _turn = segment.disturb(Disturbance::OpenByPort, TEMPORARY).await;
-    restore(bus, segment).await;
+/// Restores ports where an application begins, before anything else: the scan or test that has changed them ends there.
+/// A measurement that changes ports waits until then.
+pub(crate) fn restore_for_application(bus: &Bus, segment: &SharedSegment) {
+    if segment.view().altered().is_empty() {
+        return;
+    }
+    let turn = segment.queue_up(Disturbance::OpenByPort);
+    let (own_bus, own_segment) = (bus.clone(), segment.clone());
+    bus.spawn(async move {
+        restore(&own_bus, &own_segment).await;
+        drop(turn);
+    });
 }
 
 /// Restores ports at the end of an application, within a quarter of its limit: lost frames must not take the time of

@@ -221,6 +221,21 @@ impl SharedSegment {
         self.changed.until(|| ready(&self.segment.borrow())).await
     }
 
+    /// Carries out work; ends it with `None` as soon as the model fulfils a condition.
+    pub(crate) async fn unless<T>(
+        &self,
+        is_ended: impl Fn(&Segment) -> bool,
+        work: impl Future<Output = T>,
+    ) -> Option<T> {
+        let ended = self.until(|model| is_ended(model).then_some(()));
+        let (mut ended, mut work) = (pin!(ended), pin!(work));
+        poll_fn(|context| match ended.as_mut().poll(context) {
+            Poll::Ready(()) => Poll::Ready(None),
+            Poll::Pending => work.as_mut().poll(context).map(Some),
+        })
+        .await
+    }
+
     /// Waits until no branch of the segment is closed for a measurement.
     pub(super) async fn until_branches_are_open(&self) {
         self.until(|model| (!model.clocks().are_branches_closed()).then_some(())).await;
@@ -241,10 +256,15 @@ impl SharedSegment {
         is_done
     }
 
+    /// A place in the queue of disturbances: later ones of this kind wait until it is dropped.
+    pub(super) fn queue_up(&self, disturbance: Disturbance) -> Turn {
+        Turn::new(self, disturbance)
+    }
+
     /// Waits until no other disturbance is under way, and then blocks others; `None` if that takes longer than the
     /// limit. The returned turn must be dropped after everything has been undone.
     pub(super) async fn disturb(&self, disturbance: Disturbance, limit: Duration) -> Option<Turn> {
-        let turn = Turn::new(self, disturbance);
+        let turn = self.queue_up(disturbance);
         let granted = self.until(|segment| segment.is_granted(turn.number).then_some(()));
         self.bus.within(limit, granted).await.is_ok().then_some(turn)
     }
@@ -255,7 +275,7 @@ impl SharedSegment {
         disturbance: Disturbance,
         is_needed: impl Fn(&Segment) -> bool,
     ) -> Option<Turn> {
-        let turn = Turn::new(self, disturbance);
+        let turn = self.queue_up(disturbance);
         let granted = |segment: &Segment| match segment.is_granted(turn.number) {
             true => Some(true),
             false => (!is_needed(segment)).then_some(false),

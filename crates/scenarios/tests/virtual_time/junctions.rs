@@ -1,5 +1,6 @@
 //! Rings behind junctions on one link (protocol 9.4): every cable cut and repaired, in every mode.
 
+mod application_begins;
 mod closed_ports;
 mod declared;
 mod explorer;

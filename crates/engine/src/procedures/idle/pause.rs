@@ -1,10 +1,11 @@
-//! Work on ports without an application: broadcasts pause, and no scan begins.
+//! Work on ports without an application: broadcasts pause, and no scan of idle operation begins.
 
 use alloc::rc::Rc;
 use core::cell::RefCell;
 use core::future::Future;
 use core::time::Duration;
 
+use super::ports::follow_ports;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::segment::IdleObservation;
 use crate::segment::disturbance::Disturbance;
@@ -14,7 +15,8 @@ use crate::supervisor::Bus;
 const LIMIT: Duration = Duration::from_secs(5);
 
 /// Carries out work that closes ports for a moment; it is completed also if the caller no longer waits. Broadcasts
-/// pause meanwhile: fewer SubDevices would answer them. `None` if it cannot be done now, or a scan has begun meanwhile.
+/// pause meanwhile: fewer SubDevices would answer them. `None` if it cannot be done now, or if an application or a
+/// requested scan begins meanwhile: the work ends then, and what begins restores the ports.
 pub(crate) async fn without_watch<T: 'static>(
     bus: &Bus,
     segment: &SharedSegment,
@@ -47,8 +49,12 @@ async fn paused<T>(
     }
     let scan = segment.view().scan_number();
     segment.observe_idle(IdleObservation::Measuring);
-    let result = work.await;
+    let result = segment.unless(|model| model.is_active() || model.has_another_scan(scan), work).await;
     segment.observe_idle(IdleObservation::Measured);
-    // A scan that began meanwhile has changed the ports as well.
-    Some(result).filter(|_| segment.view().scan_number() == scan && !segment.view().is_scanning())
+    if segment.view().is_active() {
+        // The work may have read ports, which clears the events that show a change.
+        follow_ports(segment, false);
+    }
+    // A scan that has begun and ended meanwhile has changed the ports as well.
+    result.filter(|_| segment.view().scan_number() == scan)
 }

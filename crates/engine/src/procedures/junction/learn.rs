@@ -23,7 +23,7 @@ use crate::topology::{Closing, NodeStatus, PortOf, Topology, candidates_with};
 
 /// Maximum number of failed tests.
 const TRIES: usize = 256;
-/// Maximum number of failed tests without a returned frame: these cost [`TEMPORARY`] each.
+/// Maximum number of failed tests without a returned frame: these may cost [`TEMPORARY`] each.
 const SLOW_TRIES: usize = 16;
 
 /// SubDevices by position: their ports, and their station addresses.
@@ -145,7 +145,7 @@ pub(super) async fn with_closed(
     let Ok(before) = controls(bus, segment, &ports).await else { return Ok(WithClosed::NotClosed) };
     let (result, is_restored) = while_closed(bus, segment, &before, &ports, answering(bus, stations)).await;
     let result = result.and_then(|answers| answers);
-    if result.is_err() || !is_restored {
+    if !is_restored {
         // Frames were lost, or one of the two SubDevices does not answer: the settings expire.
         bus.sleep(TEMPORARY).await;
     }

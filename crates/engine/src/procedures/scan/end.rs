@@ -1,9 +1,7 @@
 //! The end of a scan, for the model.
 
 use alloc::string::String;
-use core::future::{Future, poll_fn};
-use core::pin::pin;
-use core::task::Poll;
+use core::future::Future;
 
 use super::scanned::Scanned;
 use crate::procedures::shared_segment::SharedSegment;
@@ -26,11 +24,5 @@ pub(crate) async fn unless_another<T>(
     number: u32,
     scan: impl Future<Output = T>,
 ) -> Option<T> {
-    let another = segment.until(|model| model.has_another_scan(number).then_some(()));
-    let (mut another, mut scan) = (pin!(another), pin!(scan));
-    poll_fn(|context| match another.as_mut().poll(context) {
-        Poll::Ready(()) => Poll::Ready(None),
-        Poll::Pending => scan.as_mut().poll(context).map(Some),
-    })
-    .await
+    segment.unless(|model| model.has_another_scan(number), scan).await
 }
