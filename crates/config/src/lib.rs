@@ -19,7 +19,7 @@ pub mod network;
 mod object_names;
 mod xml;
 
-pub use compare::{DeclaredPdos, Difference, DifferenceKind, FoundNetwork, Stated, StatedSyncManager};
+pub use compare::{Difference, DifferenceKind, FoundNetwork, Stated, StatedSyncManager};
 pub use configuration::{
     Configuration, DeclaredRings, ImageArea, ImageCopy, Notice, ProcessImage, SubDeviceFacts, Variable,
 };

@@ -5,11 +5,13 @@
 
 use std::collections::BTreeMap;
 
-use ringcat_engine::config::{StartupAction, SubDeviceConfig};
+use ringcat_engine::config::{PdoMapping, StartupAction, SubDeviceConfig};
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::plan;
 use ringcat_wire::sii::Pdo;
 
+use super::process_data;
+use super::samples;
 use super::written;
 
 /// Objects with the modules that are configured and detected (ETG.5001.1).
@@ -46,7 +48,14 @@ pub(super) fn differences(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> V
             continue;
         }
         let number = area.sync_manager;
+        let mut chosen = process_data::pdos(declared).filter(|(sync_manager, _)| *sync_manager == number);
+        let is_chosen = |(_, pdo): (u8, &PdoMapping)| {
+            samples::is_listed(pdo, number, info) || samples::is_sample(pdo, number, info)
+        };
         let expected = match wanted.get(&number) {
+            Some(Some(pdos)) if !pdos.is_empty() && samples::are_chosen(number, info) && chosen.all(is_chosen) => {
+                continue;
+            }
             Some(Some(pdos)) => &pdos[..],
             Some(None) => continue,
             None if writes_pdos => continue,

@@ -11,6 +11,7 @@ use ringcat_engine::{AreaPlan, plan};
 use ringcat_wire::al::AlState;
 
 use super::assignment::is_virtual;
+use super::samples;
 use super::written::Written;
 
 /// Lengths of a SyncManager in bytes.
@@ -70,7 +71,8 @@ pub(super) fn unfit(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> BTreeMa
         }
     };
     let mut unfit = BTreeMap::new();
-    for number in compared {
+    // The SII does not contain the lengths of operation modes.
+    for number in compared.into_iter().filter(|number| !samples::are_chosen(*number, info)) {
         let area = wanted.process_data.iter().find(|area| area.sync_manager == number);
         let fixed = own.process_data.iter().find(|area| area.sync_manager == number).map(|area| area.length);
         let (held, is_written) = match &written {
