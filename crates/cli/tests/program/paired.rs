@@ -21,7 +21,8 @@ const SAMPLES: &str = "<?xml version=\"1.0\"?>\n<EtherCATInfo><Vendor><Id>7</Id>
 <TxPdo Fixed=\"1\" Sm=\"0\" OSFac=\"2\" OSMin=\"1\" OSMax=\"8\" OSIndexInc=\"8\"><Index>#x1A00</Index><Name>Input</Name>
 <Entry><Index>#x6000</Index><SubIndex>1</SubIndex><BitLen>1</BitLen><Name>Input</Name><DataType>BOOL</DataType></Entry>
 </TxPdo><TxPdo Fixed=\"1\" Sm=\"0\"><Index>#x1B16</Index><Name>Gap</Name><Entry>
-<Index>0</Index><BitLen>7</BitLen></Entry></TxPdo><Dc><OpMode><Name>One</Name><AssignActivate>#x0300</AssignActivate><Sm No=\"0\"><Pdo>#x1B00</Pdo>
+<Index>0</Index><BitLen>7</BitLen></Entry></TxPdo>
+<Dc><OpMode><Name>One</Name><AssignActivate>#x0300</AssignActivate><Sm No=\"0\"><Pdo>#x1B00</Pdo>
 <Pdo OSFac=\"1\">#x1A00</Pdo><Pdo>#x1B16</Pdo></Sm></OpMode><OpMode><Name>Eight</Name>
 <AssignActivate>#x0300</AssignActivate><Sm No=\"0\"><Pdo>#x1B00</Pdo><Pdo OSFac=\"8\">#x1A00</Pdo></Sm></OpMode></Dc>
 </Device></Devices></Descriptions></EtherCATInfo>";

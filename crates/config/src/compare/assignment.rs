@@ -8,7 +8,6 @@ use std::collections::BTreeMap;
 use ringcat_engine::config::{PdoMapping, StartupAction, SubDeviceConfig};
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::plan;
-use ringcat_wire::sii::Pdo;
 
 use super::process_data;
 use super::samples;
@@ -61,7 +60,7 @@ pub(super) fn differences(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> V
             None if writes_pdos => continue,
             None => &[],
         };
-        got.retain(|index| expected.contains(index) || !is_virtual(*index, info));
+        got.retain(|index| expected.contains(index) || !process_data::is_virtual(*index, info));
         differences.extend(text(expected, &got, info).map(|text| (number, format!("SM {number}: {text}"))));
     }
     differences
@@ -82,12 +81,6 @@ fn wanted(declared: &SubDeviceConfig) -> BTreeMap<u8, Option<Vec<u16>>> {
         wanted.insert(it.sync_manager, Some(it.pdos.iter().map(|pdo| pdo.index).collect()));
     }
     wanted
-}
-
-/// Whether a PDO is for tools only: the SII lists it, the SubDevice has no object for it (protocol ES-47). A
-/// declaration that is made from a description does not contain it.
-pub(super) fn is_virtual(index: u16, info: &SubDeviceInfo) -> bool {
-    info.pdo(index).is_some_and(|pdo| pdo.flags & Pdo::VIRTUAL != 0)
 }
 
 /// How two assignments differ, with the PDOs that the SubDevice does not describe.
