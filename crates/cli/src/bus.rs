@@ -1,5 +1,6 @@
 //! A scan on interfaces or of a simulated segment, for commands that only look at a network: `init`, `compare`.
 
+use std::cell::RefCell;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -10,9 +11,9 @@ use ringcat::simulated::SimulatedSegment;
 use ringcat::text::{Names, describe};
 use ringcat::{AlState, Event, JunctionError, Links, MainDevice, Options, Scan, SubDeviceInfo};
 
-use crate::descriptions::{Detected, detected};
 use crate::failure::Failure;
 use crate::interfaces::{InterfaceArguments, LinkNames, SourceAddress};
+use crate::modules::{self, Detected, Failed, List};
 use crate::oddities::SiiOddities;
 use crate::output::{complain, warn};
 use crate::surroundings::Surroundings;
@@ -55,6 +56,8 @@ pub struct Bus {
     pub modules: Vec<Vec<u32>>,
     /// Idents of the modules of each SubDevice if its list was read completely.
     pub lists: Vec<Option<Vec<u32>>>,
+    /// SubDevices without a list of modules, by their answer.
+    pub unlisted: Vec<bool>,
     /// A declared ring behind a junction that does not close.
     pub not_closed: Option<JunctionError>,
     /// Faults of the SIIs, which are to be printed.
@@ -72,11 +75,11 @@ pub struct Wanted {
 
 impl BusArguments {
     /// Scans. `declared` is the network that is expected: its rings behind junctions are tested. `wanted` decides what
-    /// else is read from a SubDevice, which goes to PREOP for it and back to INIT.
+    /// else is read from each SubDevice, which goes to PREOP for it and back to INIT.
     pub fn scan(
         &self,
         declared: Option<&Configuration>,
-        wanted: impl FnMut(&SubDeviceInfo) -> Wanted,
+        wanted: impl FnOnce(&[SubDeviceInfo]) -> Vec<Wanted>,
     ) -> Result<Bus, Failure> {
         if let Some(path) = &self.sim {
             let segment = load_segment(path)?;
@@ -113,7 +116,7 @@ fn scan<L: Links>(
     links: L,
     options: Options,
     ring: bool,
-    (declared, mut wanted): (Option<&Configuration>, impl FnMut(&SubDeviceInfo) -> Wanted),
+    (declared, wanted): (Option<&Configuration>, impl FnOnce(&[SubDeviceInfo]) -> Vec<Wanted>),
     mut on_event: impl FnMut(&ringcat::TimedEvent),
 ) -> Result<Bus, Failure> {
     let junctions = declared.map(|declared| declared.rings.junctions).unwrap_or_default();
@@ -126,16 +129,18 @@ fn scan<L: Links>(
     });
     let scan = scan.inspect_err(|_| oddities.print(&[]))?;
     let not_closed = declared.and_then(|declared| not_closed(&mut main_device, declared));
-    let (mut firmware, mut modules, mut lists) = (Vec::new(), Vec::new(), Vec::new());
-    for info in &scan.subdevices {
+    let (mut firmware, mut modules, mut lists, mut unlisted) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for (info, wanted) in scan.subdevices.iter().zip(wanted(&scan.subdevices)) {
         let has_objects = info.protocols.coe() && info.mailbox.is_some();
-        let wanted = if has_objects { wanted(info) } else { Wanted::default() };
+        let wanted = if has_objects { wanted } else { Wanted::default() };
         let (version, detected) = read_besides(&mut main_device, info, wanted);
+        detected.warn_of(info);
         firmware.push(version);
-        lists.push(detected.is_whole.then(|| detected.idents.clone()));
+        lists.push(detected.whole().map(<[u32]>::to_vec));
+        unlisted.push(detected.list == List::Missing || !has_objects);
         modules.push(detected.idents);
     }
-    Ok(Bus { scan, ring, firmware, modules, lists, not_closed, oddities })
+    Ok(Bus { scan, ring, firmware, modules, lists, unlisted, not_closed, oddities })
 }
 
 /// A declared ring behind a junction that does not close, by the test of an activation.
@@ -168,10 +173,26 @@ pub fn read_besides<L: Links>(
         if !wanted.modules {
             return (firmware, Detected::default());
         }
-        let modules = detected(
-            main_device,
-            |main_device, index| main_device.subdevice(position).sdo_read(index, 0).ok(),
-            |main_device, index, slot| main_device.subdevice(position).sdo_read(index, slot).ok(),
+        let main_device = RefCell::new(&mut *main_device);
+        let begin = main_device.borrow().now();
+        let modules = modules::detected(
+            || main_device.borrow().now().since(begin),
+            |limit| {
+                main_device
+                    .borrow_mut()
+                    .subdevice(position)
+                    .within(limit)
+                    .sdo_read(modules::DETECTED, 0)
+                    .map_err(Failed::from)
+            },
+            |slot, limit| {
+                main_device
+                    .borrow_mut()
+                    .subdevice(position)
+                    .within(limit)
+                    .sdo_read(modules::DETECTED, slot)
+                    .map_err(Failed::from)
+            },
         );
         (firmware, modules)
     });

@@ -1,11 +1,10 @@
 //! `ringcat compare`: the network that is there, compared with the one of a file.
 
-use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use clap::Args;
 use ringcat::SubDeviceInfo;
-use ringcat::config::{Configuration, DeclaredPdos, FoundNetwork, ObjectNames, Stated};
+use ringcat::config::{Configuration, FoundNetwork, ObjectNames, Stated};
 use ringcat::eni::EniFile;
 use ringcat::network::LoadedNetwork;
 
@@ -59,17 +58,14 @@ struct Declared {
 pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
     let Declared { configuration, mut stated, names: declared } = load(arguments)?;
     let mut descriptions = arguments.esi.open()?;
-    let with_firmware: BTreeSet<(u32, u32)> =
-        stated.iter().filter(|it| !it.firmware.is_empty()).filter_map(|it| it.device).collect();
-    let declared_pdos = configuration.declared_pdos(&stated);
-    let mut bus = arguments.bus.scan(Some(&configuration), |info| Wanted {
-        firmware: with_firmware.contains(&(info.identity.vendor_id, info.identity.product_code)),
-        modules: descriptions.as_mut().is_some_and(|it| it.has_modules(info))
-            || declared_pdos.are_unlisted(info)
-            || declared_pdos.have_modules(info),
+    let mut counterparts = Vec::new();
+    let mut bus = arguments.bus.scan(Some(&configuration), |found| {
+        counterparts = configuration.counterparts(found, &stated);
+        let both = found.iter().zip(&counterparts);
+        both.map(|(info, config)| wanted(&configuration, &stated, descriptions.as_mut(), (info, *config))).collect()
     })?;
-    let unlisted = report_unlisted(&bus, &declared_pdos);
-    mark_modular(&mut stated, &bus, descriptions.as_mut());
+    let unlisted = report_unlisted(&bus, &configuration, &counterparts);
+    mark_modular(&mut stated, &bus, &counterparts, descriptions.as_mut());
     let described = complete(descriptions.as_mut(), &mut bus.scan.subdevices, &bus.modules)?;
     bus.oddities.print(&described);
     let found = &bus.scan.subdevices;
@@ -128,32 +124,52 @@ fn print(differences: &[ringcat::eni::Difference]) {
     }
 }
 
-/// Warns of SubDevices whose modules are in the file, but that do not list their modules (0xF050). Returns their
-/// positions.
-fn report_unlisted(bus: &Bus, declared: &DeclaredPdos) -> Vec<u16> {
+/// What is read of a found SubDevice with this index in the file.
+fn wanted(
+    configuration: &Configuration,
+    stated: &[Stated],
+    descriptions: Option<&mut Descriptions>,
+    (info, config): (&SubDeviceInfo, Option<usize>),
+) -> Wanted {
+    let has_slots = descriptions.is_some_and(|it| it.has_modules(info));
+    let is_declared = |config| configuration.has_unlisted_pdos(config, info) || configuration.declares_modules(config);
+    Wanted {
+        firmware: config.and_then(|config| stated.get(config)).is_some_and(|it| !it.firmware.is_empty()),
+        modules: has_slots || config.is_some_and(is_declared),
+    }
+}
+
+/// Warns of SubDevices whose modules are in the file, but that do not list their modules (0xF050), or whose list was
+/// not read. Returns their positions.
+fn report_unlisted(bus: &Bus, configuration: &Configuration, counterparts: &[Option<usize>]) -> Vec<u16> {
     let mut unlisted = Vec::new();
-    for (info, list) in bus.scan.subdevices.iter().zip(&bus.lists) {
-        if list.is_none() && declared.have_modules(info) {
+    for (at, (info, config)) in bus.scan.subdevices.iter().zip(counterparts).enumerate() {
+        let is_declared = config.is_some_and(|config| configuration.declares_modules(config));
+        if bus.lists[at].is_none() && is_declared {
             let SubDeviceInfo { position, name, .. } = info;
-            warn(format!(
-                "position {position} \"{name}\": its modules are not compared: it does not list them (0xF050)"
-            ));
+            let reason = match bus.unlisted[at] {
+                true => "it does not list them (0xF050)",
+                false => "their list (0xF050) was not read",
+            };
+            warn(format!("position {position} \"{name}\": its modules are not compared: {reason}"));
             unlisted.push(position.0);
         }
     }
     unlisted
 }
 
-/// Marks the SubDevices of the types that have modules on the bus, or slots in their descriptions.
-fn mark_modular(stated: &mut [Stated], bus: &Bus, mut descriptions: Option<&mut Descriptions>) {
-    let mut modular = BTreeSet::new();
-    for (info, modules) in bus.scan.subdevices.iter().zip(&bus.modules) {
-        if !modules.is_empty() || descriptions.as_mut().is_some_and(|it| it.has_modules(info)) {
-            modular.insert((info.identity.vendor_id, info.identity.product_code));
+/// Marks the declarations of SubDevices that have modules on the bus, or slots in their descriptions.
+fn mark_modular(
+    stated: &mut [Stated],
+    bus: &Bus,
+    counterparts: &[Option<usize>],
+    mut descriptions: Option<&mut Descriptions>,
+) {
+    for (at, (info, config)) in bus.scan.subdevices.iter().zip(counterparts).enumerate() {
+        let has_modules = !bus.modules[at].is_empty() || descriptions.as_mut().is_some_and(|it| it.has_modules(info));
+        if let Some(it) = config.and_then(|config| stated.get_mut(config)) {
+            it.modular |= has_modules;
         }
-    }
-    for it in stated {
-        it.modular |= it.device.is_some_and(|device| modular.contains(&device));
     }
 }
 

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
+use std::time::Instant;
 
 use clap::Args;
 use ringcat::config::ObjectNames;
@@ -11,12 +12,11 @@ use ringcat::esi::EsiFolder;
 use ringcat::{Position, SubDeviceInfo, SupervisorThread};
 
 use crate::failure::Failure;
+use crate::modules::{self, Failed};
 use crate::output::{counted, warn};
 
 /// Language of the names: English.
 pub const LANGUAGE: u32 = 1033;
-/// Object with the idents of the modules that a device has detected (protocol ES-69).
-const MODULES: u16 = 0xF050;
 /// Positions without a description that a warning lists.
 const LISTED: usize = 8;
 
@@ -71,44 +71,30 @@ pub fn complete_by(
 ) -> Result<Vec<ObjectNames>, Failure> {
     let mut idents = Vec::new();
     if let Some(descriptions) = &mut descriptions {
-        idents.extend(found.iter().map(|info| {
-            match descriptions.has_modules(info) {
-                true => {
-                    detected(
-                        &mut supervisor.subdevice(info.position),
-                        |subdevice, index| subdevice.sdo_read(index, 0).ok(),
-                        |subdevice, index, slot| subdevice.sdo_read(index, slot).ok(),
-                    )
-                    .idents
-                }
-                false => Vec::new(),
+        idents.extend(found.iter().map(|info| match descriptions.has_modules(info) {
+            true => {
+                let begin = Instant::now();
+                let detected = modules::detected(
+                    || begin.elapsed(),
+                    |limit| {
+                        supervisor
+                            .subdevice(info.position)
+                            .within(limit)
+                            .sdo_read(modules::DETECTED, 0)
+                            .map_err(Failed::from)
+                    },
+                    |slot, limit| {
+                        let subdevice = supervisor.subdevice(info.position).within(limit);
+                        subdevice.sdo_read(modules::DETECTED, slot).map_err(Failed::from)
+                    },
+                );
+                detected.warn_of(info);
+                detected.idents
             }
+            false => Vec::new(),
         }));
     }
     complete(descriptions, found, &idents)
-}
-
-/// The modules that a device detects.
-#[derive(Debug, Default)]
-pub struct Detected {
-    /// Their idents by slot, as far as they can be read.
-    pub idents: Vec<u32>,
-    /// The device has a list of modules, and it was read completely.
-    pub is_whole: bool,
-}
-
-/// The modules that a device has detected, by the list in its dictionary. `count` reads the length of an object,
-/// `ident` an entry. Empty if the device has no list.
-pub fn detected<D>(
-    device: &mut D,
-    count: impl Fn(&mut D, u16) -> Option<u8>,
-    ident: impl Fn(&mut D, u16, u8) -> Option<u32>,
-) -> Detected {
-    let count = count(device, MODULES);
-    let slots = 1..=count.unwrap_or(0);
-    let idents: Vec<u32> = slots.map_while(|slot| ident(device, MODULES, slot)).collect();
-    let is_whole = count.is_some_and(|count| usize::from(count) == idents.len());
-    Detected { idents, is_whole }
 }
 
 /// As [`complete`], without a report of what has no description.

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
+use ringcat::SubDeviceInfo;
 use ringcat::config::network::model::{CheckRevision, Sync as SyncTable};
 use ringcat::network::{NetworkFile, ScanOptions};
 
@@ -105,10 +106,11 @@ pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
     }
     let mut descriptions = arguments.esi.open()?;
     let begin = Instant::now();
-    let mut bus = arguments.bus.scan(None, |info| Wanted {
+    let mut wanted = |info: &SubDeviceInfo| Wanted {
         firmware: arguments.firmware,
         modules: descriptions.as_mut().is_some_and(|it| it.has_modules(info)),
-    })?;
+    };
+    let mut bus = arguments.bus.scan(None, |found| found.iter().map(&mut wanted).collect())?;
     let scanned = Instant::now();
     let objects = objects(descriptions.as_mut(), &mut bus.scan.subdevices, &bus.modules)?;
     bus.oddities.print(&objects);

@@ -17,6 +17,7 @@ mod failure;
 mod init;
 mod interfaces;
 mod json;
+mod modules;
 mod numbers;
 mod oddities;
 mod others;

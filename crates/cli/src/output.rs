@@ -4,14 +4,14 @@
 //! incomplete, so the command has failed.
 //!
 //! Texts of files and devices, and names of files, may contain control characters that a terminal would execute: all
-//! text for operators passes through [`visible`].
+//! text for operators passes through [`visible`], all JSON through [`visible_json`].
 
-use std::borrow::Cow;
 use std::fmt::Arguments;
 use std::io::{self, ErrorKind, IsTerminal, Write, stdout};
 use std::sync::OnceLock;
 use std::time::Duration;
 
+use ringcat_link::visible::{visible, visible_json};
 use serde::Serialize;
 
 use crate::json::line::{AnswerLine, EventLine, Head, Kind, SCHEMA_VERSION};
@@ -69,7 +69,7 @@ pub fn draw(text: Arguments<'_>) {
 /// Writes a line of JSON.
 pub fn write_json(line: &impl Serialize) {
     match serde_json::to_string(line) {
-        Ok(text) => put(format_args!("{text}\n")),
+        Ok(text) => put(format_args!("{}\n", visible_json(&text))),
         Err(error) => note(io::Error::other(error)),
     }
 }
@@ -85,7 +85,7 @@ pub fn write_event(time: Duration, name: Option<String>, text: &str) {
 /// The answer to an order, with its last line `ok` or `error: ...`: text, or a line of JSON.
 pub fn answer(order: &str, answer: &str) -> String {
     if !is_json() {
-        return answer.to_owned();
+        return visible(answer);
     }
     let text = answer.trim_end();
     let (ok, text) = match text.strip_prefix("error: ") {
@@ -93,7 +93,7 @@ pub fn answer(order: &str, answer: &str) -> String {
         None => (true, text.strip_suffix("ok").unwrap_or(text).trim_end()),
     };
     let line = AnswerLine { head: head(Kind::Answer), order, ok, text };
-    serde_json::to_string(&line).map_or_else(|error| error.to_string(), |line| line + "\n")
+    serde_json::to_string(&line).map_or_else(|error| error.to_string(), |line| visible_json(&line) + "\n")
 }
 
 /// What each line of this command begins with.
@@ -135,24 +135,6 @@ pub fn warn(text: impl std::fmt::Display) {
     complain(format_args!("ringcat: {text}"));
 }
 
-/// A text without characters that change the state of a terminal or the direction of what it shows: they are written as
-/// escape sequences of Rust (`\u{1b}`). Line feeds and tabs stay.
-fn visible(text: &str) -> Cow<'_, str> {
-    let is_hidden = |c: char| match c {
-        '\n' | '\t' => false,
-        '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => true,
-        _ => c.is_control(),
-    };
-    if !text.contains(is_hidden) {
-        return Cow::Borrowed(text);
-    }
-    let mut shown = String::with_capacity(text.len() + 16);
-    for c in text.chars() {
-        if is_hidden(c) { shown.extend(c.escape_debug()) } else { shown.push(c) }
-    }
-    Cow::Owned(shown)
-}
-
 /// Like `println!`, without a panic on a closed pipe; nothing where the standard output is for JSON.
 macro_rules! say {
     () => { $crate::output::write(format_args!("\n")) };
@@ -160,18 +142,3 @@ macro_rules! say {
 }
 
 pub(crate) use say;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    // covers: verdict
-    #[test]
-    fn control_characters_of_files_and_devices_are_shown_and_not_obeyed() {
-        for text in ["", "plain", "two\nlines\tand a column", "Gerät 中 \u{1F600}"] {
-            assert!(matches!(visible(text), Cow::Borrowed(shown) if shown == text));
-        }
-        let wild = "a\u{1b}[2Jb\u{9b}31m\r\u{7}\0\u{7f}\u{202e}\u{2066}c\n";
-        assert_eq!(visible(wild), "a\\u{1b}[2Jb\\u{9b}31m\\r\\u{7}\\0\\u{7f}\\u{202e}\\u{2066}c\n");
-    }
-}

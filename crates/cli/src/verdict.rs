@@ -9,6 +9,8 @@ use std::io::{Write, stdout};
 use std::os::fd::AsFd;
 use std::process::ExitCode;
 
+use ringcat_link::visible::visible_json;
+
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::line::{Ending, Kind, Outcome, ResultLine};
@@ -126,7 +128,7 @@ pub fn end_at_once(message: &str) -> ! {
         let line = line_without_data(Outcome::Failed, FAILED, message, Vec::new());
         let text = serde_json::to_string(&line).unwrap_or_default();
         // The program ends with a failure in any case.
-        let _ = File::from(out).write_all(format!("{text}\n").as_bytes());
+        let _ = File::from(out).write_all(format!("{}\n", visible_json(&text)).as_bytes());
     }
     complain(format_args!("result: FAILED: {message}"));
     std::process::exit(i32::from(FAILED));

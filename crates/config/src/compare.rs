@@ -18,6 +18,7 @@ mod order;
 mod process_data;
 mod properties;
 mod replugged;
+mod samples;
 mod signals;
 mod unlisted;
 mod written;
@@ -35,7 +36,6 @@ use align::Place;
 
 pub use difference::{Difference, DifferenceKind, FoundNetwork, Stated, StatedSyncManager};
 pub(crate) use properties::ports;
-pub use unlisted::DeclaredPdos;
 
 impl Configuration {
     /// Names of the SubDevices for messages: name and station address of the file.

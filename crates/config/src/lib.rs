@@ -20,7 +20,7 @@ mod object_names;
 mod pdo_list;
 mod xml;
 
-pub use compare::{DeclaredPdos, Difference, DifferenceKind, FoundNetwork, Stated, StatedSyncManager};
+pub use compare::{Difference, DifferenceKind, FoundNetwork, Stated, StatedSyncManager};
 pub use configuration::{
     Configuration, DeclaredRings, ImageArea, ImageCopy, Notice, ProcessImage, SubDeviceFacts, Variable,
 };

@@ -34,5 +34,6 @@ pub use message::{
 };
 pub use refusal::{Refusal, ServiceFault};
 pub use ringcat_link::process::wait_readable;
+pub use ringcat_link::visible::{is_hidden, visible};
 pub use socket::DEFAULT_SOCKET;
 pub use wire::{Limits, VERSION, WireError};

@@ -42,5 +42,5 @@ fn print_with(session: &mut Session<'_>, fill: &Fill<'_>) -> Result<(), Failure>
     fill(&mut writer).map_err(|error| Failure::failed(error.to_string()))?;
     let mut text = writer.into_text();
     text.push('\n');
-    session.write(text.as_bytes())
+    session.write_text(&text)
 }

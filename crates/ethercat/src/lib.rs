@@ -43,6 +43,7 @@ use std::path::Path;
 use arguments::Arguments;
 use commands::Found;
 use failure::Failure;
+use ringcat_control::visible;
 use session::Session;
 use shape::Output;
 
@@ -53,7 +54,7 @@ pub fn run(arguments: &[OsString], socket: &Path, output: &mut dyn Write, errors
         Ok(()) => true,
         Err(failure) => {
             // Nothing can be reported where the standard error is closed.
-            let _ = errors.write_all(failure.text().as_bytes());
+            let _ = errors.write_all(visible(&failure.text()).as_bytes());
             false
         }
     }

@@ -4,6 +4,7 @@ use std::io::{self, BufWriter, Write};
 use std::process::ExitCode;
 
 use ethercat::failure::Failure;
+use ringcat_control::visible;
 
 fn main() -> ExitCode {
     let arguments: Vec<_> = std::env::args_os().skip(1).collect();
@@ -13,7 +14,7 @@ fn main() -> ExitCode {
     let written = output.flush().map_err(Failure::from);
     if let (true, Err(failure)) = (is_good, &written) {
         // Nothing can be reported where the standard error is closed.
-        let _ = errors.write_all(failure.text().as_bytes());
+        let _ = errors.write_all(visible(&failure.text()).as_bytes());
     }
     if is_good && written.is_ok() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }

@@ -1,13 +1,13 @@
 //! A command at work: its arguments, its output, the daemon and its masters.
 
-use std::fmt::Arguments as Formatted;
-use std::io::Write;
+use std::fmt::{self, Arguments as Formatted};
+use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use ringcat_control::message::{Answer, MasterState, Query, Snapshot};
 use ringcat_control::socket::to_connect_to;
 use ringcat_control::tool::{MOST_SUBDEVICES, Piece, SubDeviceLine, ToolAnswer, ToolQuery};
-use ringcat_control::{Client, Refusal};
+use ringcat_control::{Client, Refusal, visible};
 
 use crate::arguments::Arguments;
 use crate::failure::{Failure, unexpected};
@@ -67,12 +67,28 @@ impl<'a> Session<'a> {
         Ok(self.output.write_all(bytes)?)
     }
 
+    /// Writes text.
+    ///
+    /// # Errors
+    /// The output is closed.
+    pub fn write_text(&mut self, text: &str) -> Result<(), Failure> {
+        self.write(visible(text).as_bytes())
+    }
+
     /// Writes text; for `write!`.
     ///
     /// # Errors
     /// The output is closed.
     pub fn write_fmt(&mut self, text: Formatted<'_>) -> Result<(), Failure> {
-        Ok(self.output.write_fmt(text)?)
+        self.write_text(&fmt::format(text))
+    }
+
+    /// Writes a value of a SubDevice: its bytes to a program, text to a terminal.
+    ///
+    /// # Errors
+    /// The output is closed.
+    pub fn write_value(&mut self, value: &[u8]) -> Result<(), Failure> {
+        if io::stdout().is_terminal() { self.write_text(&String::from_utf8_lossy(value)) } else { self.write(value) }
     }
 
     /// Passes on what was written so far.
@@ -86,7 +102,7 @@ impl<'a> Session<'a> {
     /// Says something on the standard error.
     pub fn say(&mut self, text: &str) {
         // Nothing can be reported where it is closed.
-        let _ = writeln!(self.errors, "{text}");
+        let _ = writeln!(self.errors, "{}", visible(text));
     }
 
     /// As [`Session::say`], with `--verbose` only.
@@ -277,5 +293,25 @@ impl<'a> Session<'a> {
                 Err(Failure::usage(text))
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // covers: daemon
+    #[test]
+    fn text_of_devices_does_not_reach_the_terminal_as_it_is() {
+        let (mut output, mut errors) = (Vec::new(), Vec::new());
+        let arguments = Arguments::parse(&[]).expect("no words");
+        let mut session = Session::new("slaves", arguments, Path::new("/"), &mut output, &mut errors);
+        writeln!(session, "0  EL\u{1b}[31m\u{200f}\tPREOP").expect("it is open");
+        session.write_text("Ger\u{e4}t\u{2028}\n").expect("it is open");
+        // Data for a program.
+        session.write(b"\x1b\n").expect("it is open");
+        session.say("a\u{9b}b");
+        assert_eq!(output, "0  EL\\u{1b}[31m\\u{200f}\tPREOP\nGer\u{e4}t\\u{2028}\n\u{1b}\n".as_bytes());
+        assert_eq!(errors, b"a\\u{9b}b\n");
     }
 }

@@ -15,6 +15,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use journal::Journal;
 pub use priority::Priority;
 
+use crate::visible::visible;
+
 /// Where the system's journal listens.
 pub const JOURNAL: &str = "/run/systemd/journal/socket";
 /// Names another socket; empty: none.
@@ -50,6 +52,7 @@ impl OperatorLines {
 
     /// Writes a line at once, or loses it.
     pub fn write(&self, priority: Priority, text: &str) {
+        let text = &shown(text)[..];
         self.to_the_journal(priority, text);
         let lost = self.lost.swap(0, Ordering::AcqRel);
         let is_written = lost == 0 || self.write_now(&self.line(Priority::Warning, &lost_lines(lost)));
@@ -61,6 +64,7 @@ impl OperatorLines {
 
     /// Writes a line to the journal, and to `out`, whose other end it may wait for.
     pub fn write_and_wait(&self, priority: Priority, text: &str, out: &mut impl Write) {
+        let text = &shown(text)[..];
         self.to_the_journal(priority, text);
         // Where nothing takes it, it is lost: a program goes on without a terminal.
         let _ = out.write_all(&self.line(priority, text));
@@ -79,12 +83,16 @@ impl OperatorLines {
     /// A line for the standard error.
     fn line(&self, priority: Priority, text: &str) -> Vec<u8> {
         let number = if self.is_stream { format!("<{}>", priority.number()) } else { String::new() };
-        let shown: String = text.chars().map(|it| if it.is_control() { ' ' } else { it }).collect();
-        let mut line = number + &shown;
+        let mut line = number + text;
         line.truncate(line.floor_char_boundary(LONGEST - 1));
         line.push('\n');
         line.into_bytes()
     }
+}
+
+/// A text on one line, as a terminal may show it.
+fn shown(text: &str) -> String {
+    visible(text).replace(['\n', '\t'], " ")
 }
 
 /// The line about lines that were lost.
@@ -107,7 +115,8 @@ mod tests {
     #[test]
     fn a_line_is_one_line_of_at_most_4096_bytes() {
         let lines = OperatorLines::new("test", |name| (name == JOURNAL_VARIABLE).then(String::new));
-        assert_eq!(lines.line(Priority::Info, "two\nlines \u{1b}[31m"), b"two lines  [31m\n");
+        let text = shown("two\nlines\t\u{1b}[31m\u{202e}\u{2028}");
+        assert_eq!(lines.line(Priority::Info, &text), b"two lines \\u{1b}[31m\\u{202e}\\u{2028}\n");
         assert_eq!(lines.line(Priority::Info, &"\u{e9}".repeat(4096)).len(), 4095);
         assert_eq!(lost_lines(1), "1 line was lost: nothing took it");
         assert_eq!(lost_lines(2), "2 lines were lost: nothing took them");

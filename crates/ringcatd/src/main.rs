@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use ringcat_control::socket::to_listen_at;
+use ringcat_control::visible;
 use ringcatd::conf::Conf;
 use ringcatd::conf::place::Place;
 use ringcatd::log::{flush, say};
@@ -51,7 +52,7 @@ fn main() -> ExitCode {
         return match look(arguments) {
             Ok(()) => ExitCode::SUCCESS,
             Err(error) => {
-                eprintln!("{error}");
+                eprintln!("{}", visible(&error));
                 ExitCode::from(2)
             }
         };
@@ -85,11 +86,11 @@ fn look(arguments: Arguments) -> Result<(), String> {
     let file = match arguments.conf {
         None if is_named => None,
         None => {
-            println!("{place}");
+            println!("{}", visible(&place.to_string()));
             Some(place.path)
         }
         Some(named) => {
-            println!("{}, as --conf names it", named.display());
+            println!("{}, as --conf names it", visible(&named.display().to_string()));
             Some(named)
         }
     };
@@ -100,7 +101,7 @@ fn look(arguments: Arguments) -> Result<(), String> {
         None => to_listen_at(|name| std::env::var_os(name))?.display().to_string(),
     };
     for line in check::lines(&conf, &setup, &socket) {
-        println!("{line}");
+        println!("{}", visible(&line));
     }
     setup.check_interfaces()
 }

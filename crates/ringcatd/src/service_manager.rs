@@ -9,6 +9,8 @@ use std::os::unix::ffi::OsStrExt;
 use std::os::unix::net::{SocketAddr, UnixDatagram};
 use std::time::Duration;
 
+use ringcat_control::visible;
+
 /// Longest text about what the daemon does.
 const LONGEST: usize = 512;
 
@@ -56,7 +58,7 @@ impl ServiceManager {
 
     /// What the daemon does, when it has changed; with it that it is ready.
     pub fn report(&mut self, status: &str, is_ready: bool) {
-        let shown: String = status.chars().map(|it| if it.is_control() { ' ' } else { it }).collect();
+        let shown = visible(status).replace(['\n', '\t'], " ");
         let shown = &shown[..shown.floor_char_boundary(LONGEST)];
         let becomes_ready = is_ready && !self.is_ready;
         if shown == self.said && !becomes_ready {

@@ -36,7 +36,8 @@ pub struct Compare {
     pub found: usize,
     /// The differences, in the order of the file
     pub differences: Vec<Difference>,
-    /// Positions of SubDevices whose modules are in the file, but not compared: they do not list them (0xF050)
+    /// Positions of SubDevices whose modules are in the file, but not compared: they do not list them (0xF050), or
+    /// their list was not read
     pub modules_not_compared: Vec<u16>,
 }
 

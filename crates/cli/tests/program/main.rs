@@ -11,6 +11,7 @@ mod exit_codes;
 mod files;
 mod json;
 mod pages;
+mod paired;
 #[cfg(feature = "standby")]
 mod service;
 mod terminal;

@@ -6,13 +6,15 @@ use crate::files::{Place, Said, ringcat};
 const ESI: &str = "<?xml version=\"1.0\"?>\n<EtherCATInfo><Vendor><Id>1</Id><Name>a\u{9b}31mb</Name></Vendor>\
                    <Descriptions><Groups><Group><Type>G</Type><Name>G\u{9b}31m</Name></Group></Groups><Devices>\
                    <Device Physics=\"YY\"><Type ProductCode=\"#x1\" RevisionNo=\"#x1\">T\u{9b}31m\u{202e}T</Type>\
-                   <Name>N\u{9b}31m</Name><GroupType>G</GroupType>\
+                   <Name>N\u{9b}31m\u{200f}\u{2028}x</Name><GroupType>G</GroupType>\
                    <Eeprom><ByteSize>256</ByteSize><ConfigData>0401000000000000000000000000</ConfigData></Eeprom>\
                    </Device></Devices></Descriptions></EtherCATInfo>";
 
 fn assert_tame(said: &Said) {
     let all = [&*said.out, &*said.errors].concat();
-    let wild = all.chars().find(|c| *c == '\u{202e}' || c.is_control() && !matches!(c, '\n' | '\t'));
+    let is_wild =
+        |c: &char| matches!(c, '\u{200f}' | '\u{2028}' | '\u{202e}') || c.is_control() && !matches!(c, '\n' | '\t');
+    let wild = all.chars().find(is_wild);
     assert_eq!(wild, None, "{:?}", said.all());
     assert!(all.len() > 20, "{}", said.all());
 }
@@ -39,6 +41,12 @@ fn control_characters_of_files_and_their_names_do_not_reach_the_terminal() {
         assert_tame(&said);
         assert_eq!(said.code, Some(expected), "{command:?} {:?}", said.all());
     }
+    let said = ringcat(&["esi", "show", &good, "--json"]);
+    assert_tame(&said);
+    assert_eq!(said.code, Some(0), "{}", said.all());
+    let lines: Vec<serde_json::Value> =
+        said.out.lines().map(|line| serde_json::from_str(line).expect("it is JSON")).collect();
+    assert!(lines.iter().any(|line| line.to_string().contains("31m\u{200f}\u{2028}x")), "{lines:?}");
     let said = ringcat(&["eni", &eni]);
     assert!(said.verdict().contains("eni\\u{1b}[2J\\r.xml: line 2"), "{}", said.all());
 }

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use ringcat_engine::config::{ConfigAddress, SubDeviceConfig};
+use ringcat_engine::config::{ConfigAddress, Resolution, SubDeviceConfig, resolve};
 use ringcat_engine::info::SubDeviceInfo;
 
-use super::alike::{Alike, DeviceKey, OWN, device, keys_of};
+use super::alike::{Alike, DeviceKey, device, is_device, keys_of};
 use super::difference::Stated;
 use super::moves::moves;
 use crate::configuration::Configuration;
@@ -43,26 +43,30 @@ pub(super) fn align(configuration: &Configuration, found: &[SubDeviceInfo], stat
     let mut info_of: Vec<Option<usize>> = vec![None; configs.len()];
     let mut moved = vec![false; configs.len()];
     let mut taken = vec![false; found.len()];
+    for (config, info) in activated(configs, found, stated) {
+        (info_of[config], taken[info]) = (Some(info), true);
+    }
     by_mark(configs, found, &mut info_of, &mut taken);
     let alike = Alike::new(configs, found, stated);
-    let is_own = |config: usize, info: usize| alike.degree(config, info) == OWN;
     let mut declared: Vec<usize> = (0..configs.len()).filter(|config| by_position(&configs[*config])).collect();
     declared.sort_by_key(|config| position(&configs[*config]));
+    let open: Vec<usize> = declared.iter().copied().filter(|config| info_of[*config].is_none()).collect();
     let free: Vec<usize> = (0..found.len()).filter(|info| !taken[*info]).collect();
-    for (config, info) in common(&declared, &free, &|config, info| alike.degree(config, info)) {
+    for (config, info) in common(&open, &free, &alike) {
         (info_of[config], taken[info]) = (Some(info), true);
     }
     // What is missing here and additional there has moved. A serial number that the file demands is found anywhere.
     for config in declared.iter().copied().filter(|config| info_of[*config].is_none()).collect::<Vec<_>>() {
-        if let Some(info) = alike.serial_at(config).filter(|info| !taken[*info] && is_own(config, *info)) {
+        if let Some(info) = alike.serial_at(config).filter(|info| !taken[*info] && alike.is_own(config, *info)) {
             (info_of[config], taken[info], moved[config]) = (Some(info), true, true);
         }
     }
     let mut by_device = ByDevice::new(found);
     let has_serial = |config: usize| configs[config].expected.serial.is_some();
-    for config in
-        declared.iter().copied().filter(|config| info_of[*config].is_none() && !has_serial(*config)).collect::<Vec<_>>()
-    {
+    let is_open = |config: &usize| info_of[*config].is_none() && !has_serial(*config);
+    let mut open: Vec<usize> = declared.iter().copied().filter(is_open).collect();
+    open.sort_by_key(|config| configs[*config].optional);
+    for config in open {
         if let Some(info) = by_device.first(device(&configs[config], stated.get(config)), &taken) {
             (info_of[config], taken[info], moved[config]) = (Some(info), true, true);
         }
@@ -229,28 +233,48 @@ fn by_mark(configs: &[SubDeviceConfig], found: &[SubDeviceInfo], info_of: &mut [
     }
 }
 
+/// The pairs of an activation that refuses no declaration, in a file with optional SubDevices: which of two alike ones
+/// is absent is decided there. None if it would take another device than the file states.
+fn activated(configs: &[SubDeviceConfig], found: &[SubDeviceInfo], stated: &[Stated]) -> Vec<(usize, usize)> {
+    if configs.iter().all(|config| !config.optional) {
+        return Vec::new();
+    }
+    let mut pairs = Vec::new();
+    for resolution in resolve(configs, found) {
+        match resolution {
+            Resolution::Found { config, info } if is_device(&configs[config], stated.get(config), &found[info]) => {
+                pairs.push((config, info));
+            }
+            Resolution::Found { .. } | Resolution::Failed { .. } => return Vec::new(),
+            Resolution::Absent { .. } | Resolution::Extra { .. } => {}
+        }
+    }
+    pairs
+}
+
 /// The best common sequence; by position where the networks are too large and too different for it.
-fn common(configs: &[usize], infos: &[usize], degree: &impl Fn(usize, usize) -> u32) -> Vec<(usize, usize)> {
+fn common(configs: &[usize], infos: &[usize], alike: &Alike<'_>) -> Vec<(usize, usize)> {
+    let is_best = |(config, info): &(usize, usize)| alike.is_best(*config, *info);
     let both = configs.iter().copied().zip(infos.iter().copied());
-    let head = both.take_while(|(config, info)| degree(*config, *info) == OWN).count();
+    let head = both.take_while(is_best).count();
     let (rest_configs, rest_infos) = (&configs[head..], &infos[head..]);
     let both = rest_configs.iter().rev().copied().zip(rest_infos.iter().rev().copied());
-    let tail = both.take_while(|(config, info)| degree(*config, *info) == OWN).count();
+    let tail = both.take_while(is_best).count();
     let (middle, between) = (&rest_configs[..rest_configs.len() - tail], &rest_infos[..rest_infos.len() - tail]);
     let mut pairs: Vec<(usize, usize)> = configs.iter().copied().zip(infos.iter().copied()).take(head).collect();
     if middle.len().saturating_mul(between.len()) <= MAX_PAIRS {
-        pairs.extend(best(middle, between, degree));
+        pairs.extend(best(middle, between, &|config, info| alike.degree(config, info)));
     } else {
         let same = middle.iter().copied().zip(between.iter().copied());
-        pairs.extend(same.filter(|(config, info)| degree(*config, *info) > 0));
+        pairs.extend(same.filter(|(config, info)| alike.degree(*config, *info) > 0));
     }
     let ends = rest_configs[middle.len()..].iter().copied().zip(rest_infos[between.len()..].iter().copied());
     pairs.extend(ends);
     pairs
 }
 
-/// The sequence with the most pairs of degree [`OWN`], then with the most pairs of the same device; of several, the one
-/// in which each is at its own place.
+/// The sequence with the most pairs that have all that the file demands, then with the most pairs of the same device;
+/// of several, the one with the fewest mandatory declarations left, then that in which each is at its own place.
 fn best(configs: &[usize], infos: &[usize], degree: &impl Fn(usize, usize) -> u32) -> Vec<(usize, usize)> {
     let width = infos.len() + 1;
     let mut sums = vec![0u32; (configs.len() + 1) * width];

@@ -7,11 +7,14 @@ use ringcat_engine::info::SubDeviceInfo;
 
 use super::difference::Stated;
 
-/// Degree of a SubDevice that has all that the file demands. It is more than any sum of [`SAME_DEVICE`]: a sequence has
-/// at most 4,096 pairs.
-pub(super) const OWN: u32 = 1 << 13;
+/// Degree of a SubDevice that has all that the file demands. It is more than any sum of [`SAME_DEVICE`] and
+/// [`MANDATORY`]: a sequence has at most 4,096 pairs.
+const OWN: u32 = 1 << 14;
 /// Degree of a SubDevice of the same vendor and product that the file refuses, for example for its serial number.
-const SAME_DEVICE: u32 = 1;
+const SAME_DEVICE: u32 = 2;
+/// What a declaration counts more that is not optional, in a file with optional ones: of two alike SubDevices the
+/// optional one is absent.
+const MANDATORY: u32 = 1;
 
 /// Vendor, product, serial number.
 type Unit = (u32, u32, u32);
@@ -25,6 +28,8 @@ pub(super) struct Alike<'a> {
     found_units: BTreeMap<Unit, usize>,
     /// The units that the file demands, with their declarations.
     declared_units: BTreeMap<Unit, usize>,
+    /// Some declarations are optional.
+    has_optional: bool,
 }
 
 impl<'a> Alike<'a> {
@@ -34,7 +39,18 @@ impl<'a> Alike<'a> {
         let declared_units: BTreeMap<Unit, usize> = declared.collect();
         let units = found.iter().enumerate().rev().map(|(info, it)| (unit_of(it), info));
         let found_units = units.filter(|(unit, _)| declared_units.contains_key(unit)).collect();
-        Alike { configs, found, stated, found_units, declared_units }
+        let has_optional = configs.iter().any(|config| config.optional);
+        Alike { configs, found, stated, found_units, declared_units, has_optional }
+    }
+
+    /// Whether a found SubDevice has all that the file demands.
+    pub(super) fn is_own(&self, config: usize, info: usize) -> bool {
+        self.degree(config, info) >= OWN
+    }
+
+    /// Whether no pair has a higher degree.
+    pub(super) fn is_best(&self, config: usize, info: usize) -> bool {
+        self.degree(config, info) == OWN + u32::from(self.has_optional) * MANDATORY
     }
 
     /// How well both match: 0 for another vendor or product, and if the serial number of one of them is elsewhere on
@@ -44,10 +60,11 @@ impl<'a> Alike<'a> {
         if !is_device(declared, self.stated.get(config), &self.found[info]) {
             return 0;
         }
+        let more = if self.has_optional && !declared.optional { MANDATORY } else { 0 };
         match declared.expected.mismatch(&self.found[info]) {
-            None => OWN,
+            None => OWN + more,
             Some(_) if self.is_claimed(config, info) => 0,
-            Some(_) => SAME_DEVICE,
+            Some(_) => SAME_DEVICE + more,
         }
     }
 

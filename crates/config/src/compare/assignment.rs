@@ -5,11 +5,12 @@
 
 use std::collections::BTreeMap;
 
-use ringcat_engine::config::{StartupAction, SubDeviceConfig};
+use ringcat_engine::config::{PdoMapping, StartupAction, SubDeviceConfig};
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::plan;
-use ringcat_wire::sii::Pdo;
 
+use super::process_data;
+use super::samples;
 use super::written;
 
 /// Objects with the modules that are configured and detected (ETG.5001.1).
@@ -46,13 +47,20 @@ pub(super) fn differences(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> V
             continue;
         }
         let number = area.sync_manager;
+        let mut chosen = process_data::pdos(declared).filter(|(sync_manager, _)| *sync_manager == number);
+        let is_chosen = |(_, pdo): (u8, &PdoMapping)| {
+            samples::is_listed(pdo, number, info) || samples::is_sample(pdo, number, info)
+        };
         let expected = match wanted.get(&number) {
+            Some(Some(pdos)) if !pdos.is_empty() && samples::are_chosen(number, info) && chosen.all(is_chosen) => {
+                continue;
+            }
             Some(Some(pdos)) => &pdos[..],
             Some(None) => continue,
             None if writes_pdos => continue,
             None => &[],
         };
-        got.retain(|index| expected.contains(index) || !is_virtual(*index, info));
+        got.retain(|index| expected.contains(index) || !process_data::is_virtual(*index, info));
         differences.extend(text(expected, &got, info).map(|text| (number, format!("SM {number}: {text}"))));
     }
     differences
@@ -73,12 +81,6 @@ fn wanted(declared: &SubDeviceConfig) -> BTreeMap<u8, Option<Vec<u16>>> {
         wanted.insert(it.sync_manager, Some(it.pdos.iter().map(|pdo| pdo.index).collect()));
     }
     wanted
-}
-
-/// Whether a PDO is for tools only: the SII lists it, the SubDevice has no object for it (protocol ES-47). A
-/// declaration that is made from a description does not contain it.
-pub(super) fn is_virtual(index: u16, info: &SubDeviceInfo) -> bool {
-    info.pdo(index).is_some_and(|pdo| pdo.flags & Pdo::VIRTUAL != 0)
 }
 
 /// How two assignments differ, with the PDOs that the SubDevice does not describe.

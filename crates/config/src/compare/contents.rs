@@ -14,6 +14,7 @@ use super::difference::{Difference, DifferenceKind, Stated};
 use super::modules;
 use super::process_data;
 use super::properties::{self, buffers, words};
+use super::samples;
 use super::signals;
 
 /// A SubDevice of the file and the one that was found.
@@ -136,7 +137,8 @@ impl Both<'_> {
                 None => add(sync_manager, text, false),
             }
         }
-        for (sync_manager, pdo) in process_data::pdos(declared) {
+        let is_sample = |(sync_manager, pdo): &(u8, &PdoMapping)| samples::is_sample(pdo, *sync_manager, info);
+        for (sync_manager, pdo) in process_data::pdos(declared).filter(|it| !is_sample(it)) {
             // One that the SubDevice does not describe is named with the assignment.
             let may_lack = is_modular || assigned_else.contains(&sync_manager);
             if let Some(text) = pdo_difference(pdo, info, may_lack) {

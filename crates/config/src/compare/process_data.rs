@@ -9,8 +9,9 @@ use ringcat_engine::config::{PdoMapping, SubDeviceConfig};
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::{AreaPlan, plan};
 use ringcat_wire::al::AlState;
+use ringcat_wire::sii::Pdo;
 
-use super::assignment::is_virtual;
+use super::samples;
 use super::written::Written;
 
 /// Lengths of a SyncManager in bytes.
@@ -84,7 +85,8 @@ pub(super) fn unfit(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> BTreeMa
         }
     };
     let mut unfit = BTreeMap::new();
-    for number in compared {
+    // The SII does not contain the lengths of operation modes.
+    for number in compared.into_iter().filter(|number| !samples::are_chosen(*number, info)) {
         let area = wanted.process_data.iter().find(|area| area.sync_manager == number);
         let fixed = own.process_data.iter().find(|area| area.sync_manager == number).map(|area| area.length);
         let (held, is_written) = match &written {
@@ -104,6 +106,12 @@ pub(super) fn unfit(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> BTreeMa
         }
     }
     unfit
+}
+
+/// Whether a PDO is for tools only: the SII lists it, the SubDevice has no object for it (protocol ES-47). A
+/// declaration that is made from a description does not contain it.
+pub(super) fn is_virtual(index: u16, info: &SubDeviceInfo) -> bool {
+    info.pdo(index).is_some_and(|pdo| pdo.flags & Pdo::VIRTUAL != 0)
 }
 
 /// All PDOs of a declaration, with their SyncManagers.

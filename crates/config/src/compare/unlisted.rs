@@ -1,53 +1,39 @@
-//! PDOs of a file that a SubDevice does not list in its SII: those of modules in its slots.
+//! Which declared SubDevice a found one is, and what of it no SII lists: PDOs of modules in slots.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use ringcat_engine::info::SubDeviceInfo;
 
-use super::alike::{DeviceKey, device, keys_of};
+use super::align::{self, Place};
 use super::difference::Stated;
 use super::modules;
 use super::process_data;
 use crate::configuration::Configuration;
 
-/// The PDOs that a file assigns, by the vendor and product of their SubDevices.
-#[derive(Clone, Debug)]
-pub struct DeclaredPdos {
-    pdos: BTreeMap<DeviceKey, BTreeSet<u16>>,
-    /// SubDevices for which the file has the modules in their slots.
-    modular: BTreeSet<DeviceKey>,
-}
-
 impl Configuration {
-    /// The PDOs that the file assigns to each type of SubDevice. `stated` is that of [`Configuration::differences`].
-    pub fn declared_pdos(&self, stated: &[Stated]) -> DeclaredPdos {
-        let mut pdos: BTreeMap<DeviceKey, BTreeSet<u16>> = BTreeMap::new();
-        let mut modular = BTreeSet::new();
-        for (config, declared) in self.declaration.subdevices.iter().enumerate() {
-            let own = process_data::pdos(declared).map(|(_, pdo)| pdo.index);
-            let key = device(declared, stated.get(config));
-            pdos.entry(key).or_default().extend(own);
-            if modules::are_declared(declared) {
-                modular.insert(key);
+    /// The declaration of each found SubDevice as [`Configuration::differences`] pairs them: its index in the file;
+    /// `None` for a SubDevice that is not in it. `stated` is that of [`Configuration::differences`].
+    pub fn counterparts(&self, found: &[SubDeviceInfo], stated: &[Stated]) -> Vec<Option<usize>> {
+        let mut counterparts = vec![None; found.len()];
+        for place in align::align(self, found, stated) {
+            if let Place::Both { config, info, .. } = place {
+                counterparts[info] = Some(config);
             }
         }
-        DeclaredPdos { pdos, modular }
+        counterparts
     }
-}
 
-impl DeclaredPdos {
-    /// Whether the file assigns PDOs to a SubDevice of this vendor and product that its SII does not list: it may have
+    /// Whether the file assigns PDOs to a declared SubDevice that the SII of the found one does not list: it may have
     /// modules in slots ([`Stated::modular`]).
-    pub fn are_unlisted(&self, found: &SubDeviceInfo) -> bool {
+    pub fn has_unlisted_pdos(&self, config: usize, found: &SubDeviceInfo) -> bool {
         let listed: BTreeSet<u16> = found.pdos.iter().map(|pdo| pdo.index).collect();
-        let mut declared = keys_of(found).into_iter().filter_map(|key| self.pdos.get(&key));
-        // At most one more is looked at than are listed.
-        declared.any(|pdos| pdos.iter().any(|index| !listed.contains(index)))
+        let declared = self.declaration.subdevices.get(config);
+        declared.is_some_and(|declared| process_data::pdos(declared).any(|(_, pdo)| !listed.contains(&pdo.index)))
     }
 
-    /// Whether the file names the modules of a SubDevice of this vendor and product: start-up commands write their list
-    /// (0xF030), which is compared with [`FoundNetwork::modules`](super::FoundNetwork::modules).
-    pub fn have_modules(&self, found: &SubDeviceInfo) -> bool {
-        keys_of(found).iter().any(|key| self.modular.contains(key))
+    /// Whether the file names the modules of a declared SubDevice: start-up commands write their list (0xF030), which
+    /// is compared with [`FoundNetwork::modules`](super::FoundNetwork::modules).
+    pub fn declares_modules(&self, config: usize) -> bool {
+        self.declaration.subdevices.get(config).is_some_and(modules::are_declared)
     }
 }

@@ -1,8 +1,9 @@
 //! A network compared with a file: each difference has one message.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use ringcat_config::network::model::{Pdo, SyncManager};
+use ringcat_config::network::Bytes;
+use ringcat_config::network::model::{Pdo, Required, Sdo, Startup, SyncManager};
 use ringcat_config::network::{NetworkFile, ScanOptions};
 use ringcat_config::{DifferenceKind, FoundNetwork};
 use ringcat_engine::Topology;
@@ -128,25 +129,44 @@ fn large_different_networks_are_compared_in_bounded_time() {
     assert!(begin.elapsed() < Duration::from_secs(20), "{:?}", begin.elapsed());
 }
 
-/// Each found SubDevice is looked up by its device: not all declarations are compared with it.
+/// By index of the bus.
 // covers: network-file
 #[test]
-fn pdos_that_no_eeprom_lists_are_found_in_linear_time() {
-    let count = 40_000;
-    let mut found = bus(&(0..count).collect::<Vec<_>>());
-    let mut file = file_of(&found);
-    for (at, subdevice) in file.subdevice.iter_mut().enumerate() {
-        let pdo = vec![Pdo { index: 0x1A00 + (at % 512) as u16, ..Pdo::default() }];
-        subdevice.sync_manager.push(SyncManager { pdo, ..SyncManager::default() });
-    }
+fn a_found_subdevice_has_the_modules_and_pdos_of_its_own_declaration() {
+    let found = bus(&[1, 1, 1, 2]);
+    let mut file = file_of(&found[..2]);
+    let pdo = |index| SyncManager { pdo: vec![Pdo { index, ..Pdo::default() }], ..SyncManager::default() };
+    file.subdevice[1].sync_manager.push(pdo(0x1A00));
+    let ident = Sdo { index: 0xF030, sub: 1, data: Bytes(vec![1, 0, 0, 0]), complete: false };
+    file.subdevice[1].startup = vec![Startup { sdo: Some(ident), ..Startup::default() }];
     let configuration = file.configuration();
-    let begin = Instant::now();
-    let declared = configuration.declared_pdos(&file.stated());
-    assert!(found.iter().all(|info| declared.are_unlisted(info)));
-    assert!(begin.elapsed() < Duration::from_secs(5), "{:?}", begin.elapsed());
-    found[0].identity.product_code = count;
-    assert!(!declared.are_unlisted(&found[0]), "the file has no such device");
-    // A declaration without a product is for any.
-    file.subdevice[1].product = None;
-    assert!(file.configuration().declared_pdos(&file.stated()).are_unlisted(&found[0]));
+    let counterparts = configuration.counterparts(&found, &file.stated());
+    assert_eq!(counterparts, [Some(0), Some(1), None, None]);
+    assert_eq!([0, 1].map(|config| configuration.declares_modules(config)), [false, true]);
+    assert_eq!([0, 1].map(|config| configuration.has_unlisted_pdos(config, &found[config])), [false, true]);
+    assert!(!configuration.declares_modules(2) && !configuration.has_unlisted_pdos(2, &found[2]));
+}
+
+/// The activation takes the one that it needs; the other one is absent, and nothing is compared with it.
+// covers: network-file
+#[test]
+fn of_two_alike_subdevices_the_optional_one_is_the_missing_one() {
+    for (products, optional, there, missing) in [
+        (&[1, 1][..], &[0][..], &[1][..], 0),
+        (&[1, 1], &[1], &[1], 1),
+        (&[1, 1], &[0, 1], &[1], 1),
+        (&[5, 1, 1, 6], &[1], &[5, 1, 6], 1),
+        (&[1, 1, 1, 2], &[0, 2], &[1, 1, 2], 2),
+        // Both refuse an activation: the second one for its product.
+        (&[1, 1, 2], &[0], &[1, 3], 0),
+    ] {
+        let mut file = file_of(&bus(products));
+        optional.iter().for_each(|at| file.subdevice[*at].optional = true);
+        for required in [Required::All, Required::Mandatory] {
+            file.required = required;
+            let all = differences(&file, &bus(there));
+            let named: Vec<_> = all.iter().filter(|it| it.0 == Missing).collect();
+            assert_eq!(named, [&(Missing, Some(missing), None)], "{products:?}, {optional:?}, {there:?}: {all:?}");
+        }
+    }
 }

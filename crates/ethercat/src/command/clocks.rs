@@ -42,7 +42,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         if state.clocks.is_empty() {
             session.say("No application uses the distributed clocks.");
         } else {
-            session.write(table(&state.clocks).as_bytes())?;
+            session.write_text(&table(&state.clocks))?;
         }
     }
     Ok(())

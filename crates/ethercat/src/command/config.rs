@@ -58,7 +58,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         } else {
             table(indent, &lines, &slaves)
         };
-        session.write(text.as_bytes())?;
+        session.write_text(&text)?;
     }
     Ok(())
 }

@@ -59,7 +59,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         return json::print(session, &Crc::new(master, &slaves, &ports));
     }
     let text = table(&slaves, &ports);
-    session.write(text.as_bytes())
+    session.write_text(&text)
 }
 
 /// The ports of all SubDevices of a master.

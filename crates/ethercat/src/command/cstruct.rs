@@ -41,7 +41,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
             if session.arguments.json {
                 whole += &text;
             } else {
-                session.write(text.as_bytes())?;
+                session.write_text(&text)?;
             }
         }
         if session.arguments.json {

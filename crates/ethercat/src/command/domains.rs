@@ -41,9 +41,9 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         }
         let indent = if is_several { "  " } else { "" };
         for (number, domain, image) in domains {
-            session.write(text(indent, number, &domain).as_bytes())?;
+            session.write_text(&text(indent, number, &domain))?;
             if is_verbose {
-                session.write(areas(indent, &domain, &image).as_bytes())?;
+                session.write_text(&areas(indent, &domain, &image))?;
             }
         }
     }

@@ -30,7 +30,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         if session.arguments.json {
             json::print(session, &Ethernet::new(master.master, &lines))?;
         } else if !lines.is_empty() {
-            session.write(table(master.master, &lines).as_bytes())?;
+            session.write_text(&table(master.master, &lines))?;
         }
     }
     Ok(())

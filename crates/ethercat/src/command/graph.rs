@@ -61,7 +61,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     if session.arguments.json {
         return json::print(session, &Text { master, text: &text });
     }
-    session.write(text.as_bytes())
+    session.write_text(&text)
 }
 
 fn graph(slaves: &[Slave], ports: &[PortsLine], clocks: &[(ClockFeatures, bool)], more: More) -> String {

@@ -50,7 +50,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         if session.arguments.json {
             json::print(session, &known)?;
         } else {
-            session.write(text(&known).as_bytes())?;
+            session.write_text(&text(&known))?;
         }
     }
     Ok(())

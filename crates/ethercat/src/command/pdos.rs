@@ -53,13 +53,13 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
                 continue;
             }
             if is_matlab {
-                session.write(matlab::function(number, &slave, &details).as_bytes())?;
+                session.write_text(&matlab::function(number, &slave, &details))?;
                 continue;
             }
             if has_header {
                 writeln!(session, "=== Master {number}, Slave {} ===", slave.line.position)?;
             }
-            session.write(listed(&details).as_bytes())?;
+            session.write_text(&listed(&details))?;
         }
     }
     Ok(())

@@ -79,7 +79,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         return json::print(session, &Registers { master, position, address, data_type, value, data });
     }
     match data_type {
-        Some(data_type) => session.write(&data_type.show(&bytes)?),
+        Some(data_type) => session.write_value(&data_type.show(&bytes)?),
         None => writeln!(session, "{}", hex::listed(&bytes)),
     }
 }

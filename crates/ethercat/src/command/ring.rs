@@ -43,7 +43,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         if masters.len() > 1 {
             writeln!(session, "Master{number}")?;
         }
-        session.write(text(&state, seen.counts, report.links.len()).as_bytes())?;
+        session.write_text(&text(&state, seen.counts, report.links.len()))?;
     }
     Ok(())
 }

@@ -88,7 +88,7 @@ fn text(session: &mut Session<'_>, index: u16, object: &ObjectLine) -> Result<()
     if session.arguments.quiet {
         return Ok(());
     }
-    object.entries.iter().try_for_each(|entry| session.write(line(index, entry).as_bytes()))
+    object.entries.iter().try_for_each(|entry| session.write_text(&line(index, entry)))
 }
 
 fn print_json(session: &mut Session<'_>, master: u32, position: u16) -> Result<(), Failure> {

@@ -40,12 +40,12 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let head = image.get(..2 * HEAD_WORDS).ok_or_else(corrupted)?;
     let mut text = "SII Area:\n".to_owned() + &hex::trimmed_lines("  ", head);
     let Some(categories) = categories(&image) else {
-        session.write(text.as_bytes())?;
+        session.write_text(&text)?;
         return Err(corrupted());
     };
     for (category, data) in categories {
         append!(text, "SII Category 0x{category:04x} ({}), {} words\n", category_name(category), data.len() / 2);
         text += &hex::trimmed_lines("  ", data);
     }
-    session.write(text.as_bytes())
+    session.write_text(&text)
 }

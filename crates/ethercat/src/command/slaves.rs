@@ -65,7 +65,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
             let ports = if slaves.is_empty() { Vec::new() } else { ports(session, number)? };
             for slave in &slaves {
                 let known = known(session, number, slave, &ports)?;
-                session.write(details(number, slave, &known.description, known.has_clock, &known.ports).as_bytes())?;
+                session.write_text(&details(number, slave, &known.description, known.has_clock, &known.ports))?;
             }
             continue;
         }
@@ -73,7 +73,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
             writeln!(session, "Master{number}")?;
         }
         let indent = if is_several { "  " } else { "" };
-        session.write(table(indent, &slaves).as_bytes())?;
+        session.write_text(&table(indent, &slaves))?;
     }
     Ok(())
 }

@@ -74,7 +74,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         let Value { data_type, value, data } = Value::new(Some(data_type), &value)?;
         return json::print(session, &Upload { master, position, index, subindex: sub_index, data_type, value, data });
     }
-    session.write(&data_type.show(&value)?)
+    session.write_value(&data_type.show(&value)?)
 }
 
 /// The index of an object.

@@ -4,6 +4,7 @@
 
 use std::fmt::{self, Display, Write};
 
+use ringcat_control::is_hidden;
 use serde::ser::{Error, Impossible, Serialize, SerializeSeq, SerializeStruct, SerializeTuple, Serializer};
 
 use crate::hex;
@@ -70,8 +71,12 @@ impl Writer {
         for it in text.chars() {
             match it {
                 '"' | '\\' => self.text.extend(['\\', it]),
-                // Writing to a string cannot fail.
-                '\0'..'\x20' | '\x7F' => _ = write!(self.text, "\\u{:04x}", it as u32),
+                it if it < ' ' || is_hidden(it) => {
+                    for unit in it.encode_utf16(&mut [0; 2]) {
+                        // Writing to a string cannot fail.
+                        _ = write!(self.text, "\\u{:04x}", u32::from(*unit));
+                    }
+                }
                 it => self.text.push(it),
             }
         }
@@ -327,8 +332,9 @@ mod tests {
     // covers: daemon, json
     #[test]
     fn a_line_is_one_line_and_kinds_without_json_are_refused() {
-        let value = inner(Scalar::Text("a\nb\r\u{7f}".to_owned()));
-        let text = "{\"schema_version\":7,\"command\":\"a\\\"b\",\"number\":\"a\\u000ab\\u000d\\u007f\",\
+        let value = inner(Scalar::Text("a\nb\r\u{7f}\u{9b}\u{200f}\u{2028}\u{e0001}".to_owned()));
+        let text = "{\"schema_version\":7,\"command\":\"a\\\"b\",\"number\":\
+                    \"a\\u000ab\\u000d\\u007f\\u009b\\u200f\\u2028\\udb40\\udc01\",\
                     \"large\":18446744073709551615,\"small\":-9223372036854775808,\"is\":true}";
         assert_eq!(written(&value), text);
         let map = std::collections::BTreeMap::from([(1, 2)]);

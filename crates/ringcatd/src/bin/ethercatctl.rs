@@ -13,10 +13,10 @@ use std::process::{Child, Command, ExitCode, Stdio};
 use std::time::{Duration, Instant};
 
 use clap::{Parser, ValueEnum};
-use ringcat_control::Client;
 use ringcat_control::client::ClientError;
 use ringcat_control::message::{Answer, MasterState, Query};
 use ringcat_control::socket::to_listen_at;
+use ringcat_control::{Client, visible};
 use ringcat_link::process::{wait_readable, watch};
 use ringcatd::conf::Conf;
 use ringcatd::conf::place::Place;
@@ -62,7 +62,7 @@ fn main() -> ExitCode {
     match run(&arguments) {
         Ok(code) => code,
         Err(error) => {
-            eprintln!("ethercatctl: {error}");
+            eprintln!("ethercatctl: {}", visible(&error));
             ExitCode::FAILURE
         }
     }
@@ -145,7 +145,7 @@ fn status(conf: &Path) -> Result<ExitCode, String> {
             (Some(owner), None) => format!("driven by {owner}"),
             (None, None) => "idle".to_owned(),
         };
-        println!("master {master} ({links}): {state}");
+        println!("{}", visible(&format!("master {master} ({links}): {state}")));
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -184,7 +184,7 @@ fn wait_until_ready(ready: &UnixDatagram, child: &mut Child) -> Result<ExitCode,
                 let text = String::from_utf8_lossy(&buffer[..length]).into_owned();
                 if text.lines().any(|line| line == "READY=1") {
                     let status = text.lines().find_map(|line| line.strip_prefix("STATUS="));
-                    println!("{}", status.unwrap_or("ready"));
+                    println!("{}", visible(status.unwrap_or("ready")));
                     return Ok(ExitCode::SUCCESS);
                 }
             }
