@@ -68,8 +68,8 @@ impl MainDevice {
     /// are not checked here.
     ///
     /// The result is [`JunctionError::NotThere`] if a ring does not close as declared, [`JunctionError::NotTested`] if
-    /// the segment is being scanned, or read after a change, for longer than ten seconds, or if a scan or an application
-    /// begins meanwhile.
+    /// the segment is being scanned, or read after a change, for longer than ten seconds, or if a scan or an
+    /// application begins meanwhile.
     pub fn start_connection_check(&mut self) -> Pending<Result<(), JunctionError>> {
         let bus = self.supervisor.bus();
         let is_permitted = self.active().is_none() && self.permit(Function::Activate).is_ok();
