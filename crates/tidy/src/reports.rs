@@ -19,10 +19,11 @@ const NOTICES: &str = "crates/engine/src/event/notice.rs";
 const PAGE: (&str, &str) = ("docs/ARCHITECTURE.md", "<!-- notices of the engine -->");
 
 /// Files of the acyclic half that start procedures, each with its reason.
-const STARTS: [(&str, &str); 17] = [
+const STARTS: [(&str, &str); 18] = [
     ("crates/engine/src/procedures/reconcile.rs", "starts what the model requests"),
     ("crates/engine/src/procedures/serve_requests.rs", "one procedure per request of the cyclic thread"),
     ("crates/engine/src/procedures/idle/pause.rs", "ports are opened again, also without the caller"),
+    ("crates/engine/src/procedures/loops.rs", "ports are opened again where an application begins"),
     ("crates/engine/src/procedures/own_objects/detection.rs", "a detection that a gateway's client orders"),
     ("crates/engine/src/mail/reader.rs", "the reader of a mailbox, as long as it is open"),
     ("crates/engine/src/mail/writer.rs", "the writer of a mailbox, as long as it is open"),
