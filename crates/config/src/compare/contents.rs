@@ -118,13 +118,16 @@ impl Both<'_> {
         let mut unfit = process_data::unfit(declared, info);
         let mut assigned = Vec::new();
         if is_modular {
-            // Its SII describes none of its modules: only what an ENI does not have at all.
-            unfit.retain(|_, lengths| lengths.is_left_out());
+            // Its SII describes none of its modules: only what an ENI does not have at all. A SyncManager that is
+            // declared as disabled has no modules of its direction.
+            let has = |number: u8| declared.declared.iter().flatten().any(|it| it.index == number);
+            unfit.retain(|number, lengths| lengths.is_left_out() && !has(*number));
         } else {
             assigned = assignment::differences(declared, info);
         }
-        // Without a module of its direction it has no process data, whatever its SII says.
-        let prevents_op = |lengths: &process_data::Lengths| !is_modular || lengths.is_written;
+        // Without modules it may have no process data.
+        let has_modules = || self.modules.is_some_and(|list| list.iter().any(|ident| *ident != 0));
+        let prevents_op = |lengths: &process_data::Lengths| !is_modular || lengths.is_written || has_modules();
         let mut named = BTreeSet::new();
         let mut add = |sync_manager: u8, text: String, prevents_op: bool| {
             named.insert(sync_manager);

@@ -15,8 +15,8 @@ use crate::ring::RingState;
 use crate::segment::Segment;
 use crate::supervisor::Bus;
 
-/// Maximum wait until an opened ring of two links whose ports are open again is seen closed: broadcasts pause meanwhile,
-/// and a ring that broke has to be noticed soon.
+/// Maximum wait until an opened ring of two links whose ports are open again is seen closed: broadcasts pause
+/// meanwhile, and a ring that broke has to be noticed soon.
 const CLOSING: Duration = Duration::from_millis(50);
 
 /// Rings that are opened.
