@@ -4,6 +4,7 @@
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
+use ringcat::wire::mailbox::sdo::AbortCode;
 use ringcat::{Error, SdoFailure, SubDeviceFailure, SubDeviceInfo};
 
 use crate::output::warn;
@@ -44,19 +45,21 @@ pub enum List {
 /// Why a read failed.
 #[derive(Debug)]
 pub enum Failed {
-    /// The device has answered with an abort code.
-    Aborted(String),
-    /// No answer, or another fault.
+    /// The device has no such object, by its answer.
+    NoObject,
+    /// No answer, another abort code, or another fault.
     Otherwise(String),
 }
 
 impl From<Error> for Failed {
     fn from(error: Error) -> Failed {
         let Error::SubDevice(error) = error else { return Failed::Otherwise(error.to_string()) };
-        let text = error.failure.to_string();
+        let is_absent = |code: AbortCode| code == AbortCode::OBJECT_DOES_NOT_EXIST;
         match &error.failure {
-            SubDeviceFailure::Sdo(error) if matches!(error.cause, SdoFailure::Aborted(_)) => Failed::Aborted(text),
-            _ => Failed::Otherwise(text),
+            SubDeviceFailure::Sdo(it) if matches!(it.cause, SdoFailure::Aborted(code) if is_absent(code)) => {
+                Failed::NoObject
+            }
+            failure => Failed::Otherwise(failure.to_string()),
         }
     }
 }
@@ -70,7 +73,7 @@ pub fn detected(
 ) -> Detected {
     let count = match count(LIMIT) {
         Ok(count) => count,
-        Err(Failed::Aborted(_)) => return Detected { idents: Vec::new(), list: List::Missing },
+        Err(Failed::NoObject) => return Detected { idents: Vec::new(), list: List::Missing },
         Err(Failed::Otherwise(reason)) => return partly(Vec::new(), None, reason),
     };
     let mut idents = Vec::new();
@@ -82,7 +85,9 @@ pub fn detected(
         }
         match ident(slot, left) {
             Ok(ident) => idents.push(ident),
-            Err(Failed::Aborted(reason) | Failed::Otherwise(reason)) => {
+            Err(Failed::Otherwise(reason)) => return partly(idents, Some(slot..=count), reason),
+            Err(Failed::NoObject) => {
+                let reason = AbortCode::OBJECT_DOES_NOT_EXIST.to_string();
                 return partly(idents, Some(slot..=count), reason);
             }
         }
@@ -153,7 +158,7 @@ mod tests {
         assert_eq!((some.idents.len(), time), (2, LIMIT));
         let (none, _) = read(Err(Failed::Otherwise("no mailbox".to_owned())), Duration::ZERO);
         assert_eq!(none.unread().as_deref(), Some("its list of modules (0xF050): no mailbox"));
-        let (missing, _) = read(Err(Failed::Aborted("no object".to_owned())), Duration::ZERO);
+        let (missing, _) = read(Err(Failed::NoObject), Duration::ZERO);
         assert_eq!((missing.list, missing.idents.len()), (List::Missing, 0));
         let (empty, _) = read(Ok(0), Duration::ZERO);
         assert_eq!((empty.whole(), empty.unread()), (Some(&[][..]), None));

@@ -83,12 +83,15 @@ impl<'a> Session<'a> {
         self.write_text(&fmt::format(text))
     }
 
-    /// Writes a value of a SubDevice: its bytes to a program, text to a terminal.
+    /// Writes a value of a SubDevice: its bytes to a program, text to a terminal, which shows no zero bytes.
     ///
     /// # Errors
     /// The output is closed.
     pub fn write_value(&mut self, value: &[u8]) -> Result<(), Failure> {
-        if io::stdout().is_terminal() { self.write_text(&String::from_utf8_lossy(value)) } else { self.write(value) }
+        if !io::stdout().is_terminal() {
+            return self.write(value);
+        }
+        self.write_text(&String::from_utf8_lossy(value).replace('\0', ""))
     }
 
     /// Passes on what was written so far.

@@ -85,9 +85,12 @@ pub(super) fn unfit(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> BTreeMa
         }
     };
     let mut unfit = BTreeMap::new();
-    // The SII does not contain the lengths of operation modes.
-    for number in compared.into_iter().filter(|number| !samples::are_chosen(*number, info)) {
+    for number in compared {
         let area = wanted.process_data.iter().find(|area| area.sync_manager == number);
+        // The SII does not contain the lengths of operation modes; none has no process data.
+        if samples::are_chosen(number, info) && area.is_some_and(|area| area.length > 0) {
+            continue;
+        }
         let fixed = own.process_data.iter().find(|area| area.sync_manager == number).map(|area| area.length);
         let (held, is_written) = match &written {
             Some(written) => written.bytes(number, fixed).unzip(),

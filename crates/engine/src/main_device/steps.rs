@@ -68,8 +68,9 @@ impl MainDevice {
     /// are not checked here.
     ///
     /// The result is [`JunctionError::NotThere`] if a ring does not close as declared, [`JunctionError::NotTested`] if
-    /// the segment changes during each of five tests, if a scan or an application begins meanwhile, or if a scan or
-    /// another procedure uses the segment for longer than five seconds each.
+    /// the segment changes during each of five tests, if a SubDevice of the scan does not answer, if a scan or an
+    /// application begins meanwhile, or if a scan or another procedure uses the segment for longer than five seconds
+    /// each.
     pub fn start_connection_check(&mut self) -> Pending<Result<(), JunctionError>> {
         let bus = self.supervisor.bus();
         let is_permitted = self.active().is_none() && self.permit(Function::Activate).is_ok();

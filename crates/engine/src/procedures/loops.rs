@@ -80,6 +80,7 @@ pub(super) async fn followed(
             segment.observe(Observation::PortsRead { station, orders, control });
             return Ok(Some(control));
         }
+        bus.sleep(PAUSE).await;
     }
     Ok(None)
 }
@@ -128,27 +129,37 @@ pub(super) async fn while_closed<T>(
     (result, restore(bus, segment).await)
 }
 
-/// The present loop settings of the SubDevices that have these ports. An error if one of the ports is closed.
+/// The present loop settings of the SubDevices that have these ports; `None` if the application or another program
+/// writes them again and again ([`followed`]).
+pub(super) async fn settings(
+    bus: &Bus,
+    segment: &SharedSegment,
+    ports: &[(StationAddress, u8)],
+) -> Result<Option<Vec<(StationAddress, DlControl)>>, BusError> {
+    let mut stations: Vec<StationAddress> = ports.iter().map(|(station, _)| *station).collect();
+    stations.put_in_order();
+    stations.dedup();
+    let mut settings = Vec::new();
+    for station in stations {
+        let Some(control) = followed(bus, segment, station).await? else { return Ok(None) };
+        settings.push((station, control));
+    }
+    Ok(Some(settings))
+}
+
+/// As [`settings`]. An error if there are none, or if one of the ports is closed.
 pub(super) async fn controls(
     bus: &Bus,
     segment: &SharedSegment,
     ports: &[(StationAddress, u8)],
 ) -> Result<Vec<(StationAddress, DlControl)>, String> {
-    let mut stations: Vec<StationAddress> = ports.iter().map(|(station, _)| *station).collect();
-    stations.put_in_order();
-    stations.dedup();
-    if stations.len() > bus.max_datagrams() {
-        return Err(format!("{} SubDevices have ports to close, more than datagrams in a frame", stations.len()));
-    }
-    let mut controls = Vec::new();
-    for station in stations {
-        let read = followed(bus, segment, station).await.map_err(|error| error.to_string())?;
-        let Some(control) = read else { return Err(format!("the ports of station {station} are being written")) };
+    let read = settings(bus, segment, ports).await.map_err(|error| error.to_string())?;
+    let controls = read.ok_or("ports that have to be closed for a moment are being written")?;
+    for (station, control) in &controls {
         let is_closed = |port: &u8| control.loops[usize::from(port & 3)] == LoopControl::Closed;
-        if ports.iter().any(|(of, port)| *of == station && is_closed(port)) {
+        if ports.iter().any(|(of, port)| of == station && is_closed(port)) {
             return Err(format!("a port of station {station} that has to be closed for a moment is already closed"));
         }
-        controls.push((station, control));
     }
     Ok(controls)
 }

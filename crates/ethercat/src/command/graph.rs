@@ -1,5 +1,6 @@
 //! `graph`: the ring as a graph in DOT.
 
+use ringcat_control::is_hidden;
 use ringcat_control::tool::{ClockFeatures, PortLine, PortsLine};
 
 use super::crc::ports;
@@ -138,7 +139,7 @@ fn clock_name(features: &ClockFeatures, has_clock: bool) -> &'static str {
 /// A text between quotes.
 fn quoted(text: &str) -> String {
     let plain = text.replace('\\', "\\\\").replace('"', "\\\"");
-    plain.chars().map(|it| if it.is_control() { ' ' } else { it }).collect()
+    plain.chars().map(|it| if it.is_control() || is_hidden(it) { ' ' } else { it }).collect()
 }
 
 #[cfg(test)]

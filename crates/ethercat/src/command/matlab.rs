@@ -1,5 +1,6 @@
 //! PDOs as a function of MATLAB, as `pdos --skin etherlab` prints them.
 
+use ringcat_control::is_hidden;
 use ringcat_control::tool::{Description, SyncManagerLine};
 
 use crate::append::append;
@@ -8,7 +9,8 @@ use crate::selection::Slave;
 /// The function of one SubDevice.
 pub fn function(master: u32, slave: &Slave, details: &Description) -> String {
     let position = slave.line.position;
-    let order: String = slave.line.order.chars().map(|it| if it.is_control() { ' ' } else { it }).collect();
+    let order: String =
+        slave.line.order.chars().map(|it| if it.is_control() || is_hidden(it) { ' ' } else { it }).collect();
     let [vendor, product, ..] = slave.line.identity;
     let mut text =
         format!("%\n% Master {master}, Slave {position}, \"{order}\"\n%\nfunction rv = slave{position}()\n\n");

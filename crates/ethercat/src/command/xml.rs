@@ -1,5 +1,6 @@
 //! `xml`: SubDevices as device descriptions.
 
+use ringcat_control::is_hidden;
 use ringcat_control::tool::{Description, PdoEntryLine, PdoLine};
 
 use super::slaves::description;
@@ -98,7 +99,7 @@ fn entry_element(entry: &PdoEntryLine) -> String {
 
 /// Characters that XML allows.
 fn allowed(text: &str) -> String {
-    let is_allowed = |it: char| !it.is_control() && !matches!(it, '\u{FFFE}' | '\u{FFFF}');
+    let is_allowed = |it: char| !it.is_control() && !is_hidden(it) && !matches!(it, '\u{FFFE}' | '\u{FFFF}');
     text.chars().map(|it| if is_allowed(it) { it } else { ' ' }).collect()
 }
 

@@ -40,6 +40,8 @@ const MOST_FAILURES: u32 = 16;
 const SCANS: u32 = 3;
 /// Maximum wait for other disturbances before rings are opened.
 const LIMIT: Duration = Duration::from_secs(5);
+/// Maximum wait until a ring whose ports have opened by themselves is seen closed.
+const CLOSING: Duration = Duration::from_millis(50);
 /// The SubDevices that answer, in the order in which frames pass them.
 #[derive(Clone, Debug)]
 struct Survey {
@@ -173,7 +175,8 @@ async fn measure_open(
         until_expired(bus, before.iter().map(|(station, _)| *station)).await;
     }
     if survey.is_closed {
-        until_ring_is_closed(bus, TEMPORARY).await;
+        // The ports are open by now, unless the ring broke meanwhile.
+        until_ring_is_closed(bus, if is_restored { TEMPORARY } else { CLOSING }).await;
     }
     drop(turn);
     result.map_err(|error| error.to_string())?.map(drop)

@@ -16,7 +16,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::map;
 
 use crate::order::InOrder;
-use crate::procedures::loops::{TEMPORARY, controls, while_closed};
+use crate::procedures::loops::{TEMPORARY, settings, while_closed};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{Closing, NodeStatus, PortOf, Topology, candidates_with};
@@ -130,11 +130,12 @@ pub(super) enum WithClosed {
     Answers(Vec<bool>),
     /// No frame returned, or one of the ends was not reached.
     NoFrame,
-    /// The ports were not closed: one is closed already, or they are being set by the application or another program.
+    /// The ports were not closed: they are being set by the application or another program.
     NotClosed,
 }
 
-/// Which SubDevices with these station addresses answer while these ports are closed for a moment.
+/// Which SubDevices with these station addresses answer while these ports are closed for a moment. An error if the
+/// present settings cannot be read.
 pub(super) async fn with_closed(
     (bus, segment): (&Bus, &SharedSegment),
     ports: &[PortOf],
@@ -142,7 +143,7 @@ pub(super) async fn with_closed(
 ) -> Result<WithClosed, BusError> {
     let of = |port: &PortOf| stations.get(port.node).map(|station| (*station, port.port));
     let ports: Vec<(StationAddress, u8)> = ports.iter().filter_map(of).collect();
-    let Ok(before) = controls(bus, segment, &ports).await else { return Ok(WithClosed::NotClosed) };
+    let Some(before) = settings(bus, segment, &ports).await? else { return Ok(WithClosed::NotClosed) };
     let (result, is_restored) = while_closed(bus, segment, &before, &ports, answering(bus, stations)).await;
     let result = result.and_then(|answers| answers);
     if !is_restored {

@@ -28,6 +28,10 @@ const TESTS: usize = 5;
 /// Scans until all SubDevices answer, and until all ports are open again.
 const SCANS: u8 = 5;
 const PAUSE: Duration = Duration::from_millis(2);
+/// Pause before another test where SubDevices did not answer.
+const BETWEEN: Duration = Duration::from_millis(50);
+/// No further test begins after this time.
+const LIMIT: Duration = Duration::from_secs(5);
 
 /// Result of a test of connections.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,7 +40,7 @@ pub(crate) enum Refuted {
     None,
     /// The closing cable with this number is not, and the evidence.
     Closing(usize, ClosingEvidence),
-    /// The segment changed during each test, or it is in use by a scan or an application by now.
+    /// The segment changed during each test or did not answer, or a scan or an application has begun.
     NotTested,
 }
 
@@ -47,29 +51,33 @@ pub(crate) async fn refute(
     main_count: usize,
     closings: &[Closing],
 ) -> Refuted {
-    let scan = segment.view().scan_number();
-    let mut negatives = 0;
-    for _ in 0..TESTS {
+    let (scan, until) = (segment.view().scan_number(), bus.now() + LIMIT);
+    let mut negatives: Vec<usize> = Vec::new();
+    for test in 0..TESTS {
         let is_in_use = {
             let view = segment.view();
             view.is_active() || view.is_scanning() || view.scan_number() != scan
         };
-        if is_in_use {
+        if is_in_use || (test > 0 && bus.now() >= until) {
             break;
         }
-        let Some(nodes) = present_ports(bus, scanned).await else { continue };
-        let tested = attempt(on, Reached { nodes: &nodes, ..scanned }, main_count, closings).await;
-        if !are_ports_as(bus, scanned, &nodes).await {
-            negatives = 0;
+        let Some(nodes) = present_ports(bus, scanned).await else {
+            negatives.clear();
+            bus.sleep(BETWEEN).await;
             continue;
-        }
+        };
+        let tested = attempt(on, Reached { nodes: &nodes, ..scanned }, main_count, closings).await;
         match tested {
+            _ if !are_ports_as(bus, scanned, &nodes).await => negatives.clear(),
             Refuted::None => return Refuted::None,
-            Refuted::Closing(..) => negatives += 1,
-            Refuted::NotTested => {}
-        }
-        if negatives == NEGATIVES {
-            return tested;
+            Refuted::NotTested => negatives.clear(),
+            Refuted::Closing(number, _) => {
+                negatives.retain(|before| *before == number);
+                negatives.push(number);
+                if negatives.len() == NEGATIVES {
+                    return tested;
+                }
+            }
         }
     }
     Refuted::NotTested
@@ -116,7 +124,9 @@ async fn attempt(
 /// Whether all ports are as before; ports that were opened again may take a moment.
 async fn are_ports_as(bus: &Bus, scanned: Reached<'_>, before: &[NodeStatus]) -> bool {
     for _ in 0..SCANS {
-        if present_ports(bus, scanned).await.is_some_and(|now| now == before) {
+        let now = present_ports(bus, scanned).await;
+        let ports = |nodes: &[NodeStatus]| nodes.iter().map(|it| it.dl_status.ports).collect::<Vec<_>>();
+        if now.is_some_and(|now| ports(&now) == ports(before)) {
             return true;
         }
         bus.sleep(PAUSE).await;
