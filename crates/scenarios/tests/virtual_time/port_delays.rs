@@ -114,13 +114,13 @@ fn a_report_while_a_change_is_followed_has_no_delays() {
     assert_eq!(report.iter().filter(|it| it.delay_ns.is_some()).count(), 4);
 }
 
-/// A ring that breaks while it is open for a report is noticed as soon as at any time. A port that the cut has made
+/// A ring that breaks while it is open for a report is noticed after the report. A port that the cut has made
 /// unreachable opens by itself after a second: until then idle operation waits, and no SubDevice counts as removed.
 // covers: registers, ring-goes-on
 #[test]
 fn a_cut_while_rings_are_open_for_a_report_is_noticed_and_removes_no_subdevice() {
     let (mut were_open, cables) = (0, [IN_FRONT, CableId(RING_OF_THREE[1]), CableId(RING_OF_THREE[2])]);
-    for (cable, after) in cables.into_iter().flat_map(|cable| (0..60).map(move |after| (cable, after))) {
+    for (cable, after) in cables.into_iter().flat_map(|cable| (0..60).step_by(2).map(move |after| (cable, after))) {
         let mut main_device = both_rings();
         main_device.attend(SECOND);
         while main_device.pop_event().is_some() {}

@@ -37,14 +37,14 @@ fn closed(network: &Network) -> Vec<usize> {
 #[test]
 fn a_wrong_connection_is_not_accepted_while_cables_change() {
     let mut tested = 0;
-    for (after, declared) in (0..40).flat_map(|after| [(after, WRONG), (after, STRICT)]) {
+    for (after, declared) in (0..20).flat_map(|after| [(after, WRONG), (after, STRICT)]) {
         for cable in [CableId(RING_OF_THREE[1]), CableId(7)] {
             let mut main_device = idle(JunctionMode::Strict);
             main_device.attend(SECOND);
             main_device.load(automatic(&main_device.subdevices(), CYCLE)).expect("it fits");
             main_device.add_junction_connection(declared).expect("ports that exist");
             let mut check = main_device.engine_mut().start_connection_check();
-            main_device.attend(Duration::from_micros(75 * after));
+            main_device.attend(Duration::from_micros(150 * after));
             main_device.links_mut().network_mut().apply(Fault::Cut(cable));
             main_device.attend(Duration::from_millis(2));
             main_device.links_mut().network_mut().apply(Fault::Heal(cable));
@@ -67,5 +67,5 @@ fn a_wrong_connection_is_not_accepted_while_cables_change() {
             tested += usize::from(checked != Err(JunctionError::NotTested));
         }
     }
-    assert!(tested > 100, "{tested} of 160 were tested");
+    assert!(tested > 50, "{tested} of 80 were tested");
 }
