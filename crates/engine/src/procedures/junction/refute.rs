@@ -6,7 +6,8 @@
 //! only one end has communication there is no cable between the two. If neither has, the closing cable may be broken;
 //! such a ring is accepted without a test.
 //!
-//! A segment that changes during the test gives no result: it is tested again. So is a negative result.
+//! A segment that changes during the test gives no result: it is tested again. So is a negative result, which counts
+//! if the next test has the same.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -21,8 +22,6 @@ use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::Bus;
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 
-/// Consecutive negative results that are required.
-const NEGATIVES: usize = 2;
 /// Tests of a segment that changes during each.
 const TESTS: usize = 5;
 /// Scans until all SubDevices answer, and until all ports are open again.
@@ -52,7 +51,8 @@ pub(crate) async fn refute(
     closings: &[Closing],
 ) -> Refuted {
     let (scan, until) = (segment.view().scan_number(), bus.now() + LIMIT);
-    let mut negatives: Vec<usize> = Vec::new();
+    // The closing cable that the last test has not found.
+    let mut refuted = None;
     for test in 0..TESTS {
         let is_in_use = {
             let view = segment.view();
@@ -62,23 +62,18 @@ pub(crate) async fn refute(
             break;
         }
         let Some(nodes) = present_ports(bus, scanned).await else {
-            negatives.clear();
+            refuted = None;
             bus.sleep(BETWEEN).await;
             continue;
         };
         let tested = attempt(on, Reached { nodes: &nodes, ..scanned }, main_count, closings).await;
-        match tested {
-            _ if !are_ports_as(bus, scanned, &nodes).await => negatives.clear(),
-            Refuted::None => return Refuted::None,
-            Refuted::NotTested => negatives.clear(),
-            Refuted::Closing(number, _) => {
-                negatives.retain(|before| *before == number);
-                negatives.push(number);
-                if negatives.len() == NEGATIVES {
-                    return tested;
-                }
-            }
-        }
+        refuted = match tested {
+            _ if !are_ports_as(bus, scanned, &nodes).await => None,
+            Refuted::None => return tested,
+            Refuted::Closing(number, _) if refuted == Some(number) => return tested,
+            Refuted::Closing(number, _) => Some(number),
+            Refuted::NotTested => None,
+        };
     }
     Refuted::NotTested
 }
