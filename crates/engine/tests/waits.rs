@@ -40,7 +40,7 @@ const EVALUATIONS: [&str; 3] = ["segment/attention.rs", "segment/idle.rs", "segm
 const TABLE: &str = "<!-- pauses for another part of the engine -->";
 
 /// By file or directory, each pause in its order.
-const WAITS: [(&str, &[Reason]); 42] = [
+const WAITS: [(&str, &[Reason]); 41] = [
     ("mail/foe.rs", &[Retry]),
     ("mail/reader.rs", &[Register]),
     ("mail/voe.rs", &[Register]),
@@ -59,7 +59,6 @@ const WAITS: [(&str, &[Reason]); 42] = [
     ("procedures/idle.rs", &[Cyclic]),
     ("procedures/inspect.rs", &[Pace]),
     ("procedures/junction/isolate.rs", &[Settle]),
-    ("procedures/junction/learn.rs", &[Settle]),
     ("procedures/junction/refute.rs", &[Retry, Register, Retry]),
     ("procedures/loops.rs", &[Register, Register, Retry, Register]),
     ("procedures/mail_watch.rs", &[Cyclic]),

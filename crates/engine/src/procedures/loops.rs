@@ -55,11 +55,16 @@ pub(super) async fn lasting(bus: &Bus, station: StationAddress) -> Result<Option
     }
 }
 
+async fn is_lasting(bus: &Bus, station: StationAddress) -> bool {
+    let read = bus.fprd_array(station, map::DL_CONTROL).await;
+    read.is_ok_and(|bytes| !DlControl::decode(&bytes).temporary)
+}
+
 /// Waits until none of these SubDevices has temporary settings any more, for at most [`TEMPORARY`].
-pub(super) async fn until_expired(bus: &Bus, stations: impl Iterator<Item = StationAddress>) {
+async fn until_expired(bus: &Bus, stations: impl Iterator<Item = StationAddress>) {
     let until = bus.now() + TEMPORARY;
     for station in stations {
-        while bus.now() < until && !matches!(lasting(bus, station).await, Ok(Some(_))) {
+        while bus.now() < until && !is_lasting(bus, station).await {
             bus.sleep(PAUSE).await;
         }
     }
@@ -110,7 +115,7 @@ pub(super) fn write_of((station, control): (StationAddress, DlControl)) -> (Comm
 
 /// Closes ports for a moment, in one frame, carries out `work`, and restores the settings of the model. `before`: the
 /// present settings of their SubDevices ([`controls`]). Returns the result, an error without `work` if the ports could
-/// not be closed, and whether the settings were restored ([`restore`]).
+/// not be closed, and whether the settings were restored ([`restore`]): if not, they have expired by then.
 pub(super) async fn while_closed<T>(
     bus: &Bus,
     segment: &SharedSegment,
@@ -126,7 +131,12 @@ pub(super) async fn while_closed<T>(
         Ok(()) => Ok(work.await),
         Err(error) => Err(error),
     };
-    (result, restore(bus, segment).await)
+    let is_restored = restore(bus, segment).await;
+    if !is_restored {
+        // A port that is out of reach opens by itself. Until then SubDevices behind it would count as removed.
+        until_expired(bus, before.iter().map(|(station, _)| *station)).await;
+    }
+    (result, is_restored)
 }
 
 /// The present loop settings of the SubDevices that have these ports; `None` if the application or another program

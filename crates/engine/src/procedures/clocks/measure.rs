@@ -21,7 +21,7 @@ use crate::clocks::{Cables, Disagreement, Latched, Measured, Measurements, Passa
 use crate::event::Subject;
 use crate::link::{Link, LinkSet};
 use crate::procedures::latch::{self as frames, Pauses};
-use crate::procedures::loops::{TEMPORARY, controls, until_expired, until_ring_is_closed, while_closed};
+use crate::procedures::loops::{TEMPORARY, controls, until_ring_is_closed, while_closed};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::unassigned::view;
 use crate::ring::RingState;
@@ -171,9 +171,6 @@ async fn measure_open(
     // The port at the end of a ring of two links is closed: frames on the redundant link do not return.
     open.no_return = survey.is_closed.then_some(Link::Redundant);
     let (result, is_restored) = while_closed(bus, segment, &before, &ports, take(bus, segment, &open)).await;
-    if !is_restored {
-        until_expired(bus, before.iter().map(|(station, _)| *station)).await;
-    }
     if survey.is_closed {
         // The ports are open by now, unless the ring broke meanwhile.
         until_ring_is_closed(bus, if is_restored { TEMPORARY } else { CLOSING }).await;

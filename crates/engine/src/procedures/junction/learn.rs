@@ -16,14 +16,14 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::map;
 
 use crate::order::InOrder;
-use crate::procedures::loops::{TEMPORARY, settings, while_closed};
+use crate::procedures::loops::{settings, while_closed};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::{Bus, BusError};
 use crate::topology::{Closing, NodeStatus, PortOf, Topology, candidates_with};
 
 /// Maximum number of failed tests.
 const TRIES: usize = 256;
-/// Maximum number of failed tests without a returned frame: these may cost [`TEMPORARY`] each.
+/// Maximum number of failed tests without a returned frame: these may cost more than a second each.
 const SLOW_TRIES: usize = 16;
 
 /// SubDevices by position: their ports, and their station addresses.
@@ -144,13 +144,8 @@ pub(super) async fn with_closed(
     let of = |port: &PortOf| stations.get(port.node).map(|station| (*station, port.port));
     let ports: Vec<(StationAddress, u8)> = ports.iter().filter_map(of).collect();
     let Some(before) = settings(bus, segment, &ports).await? else { return Ok(WithClosed::NotClosed) };
-    let (result, is_restored) = while_closed(bus, segment, &before, &ports, answering(bus, stations)).await;
-    let result = result.and_then(|answers| answers);
-    if !is_restored {
-        // Frames were lost, or one of the two SubDevices does not answer: the settings expire.
-        bus.sleep(TEMPORARY).await;
-    }
-    Ok(result.map_or(WithClosed::NoFrame, WithClosed::Answers))
+    let (result, _) = while_closed(bus, segment, &before, &ports, answering(bus, stations)).await;
+    Ok(result.and_then(|answers| answers).map_or(WithClosed::NoFrame, WithClosed::Answers))
 }
 
 /// Which SubDevices answer, by position.

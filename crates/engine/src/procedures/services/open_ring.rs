@@ -9,7 +9,7 @@ use ringcat_wire::register::{DlStatus, map};
 
 use crate::link::LinkSet;
 use crate::procedures::idle::{are_ports_as_scanned, without_watch};
-use crate::procedures::loops::{controls, until_expired, until_ring_is_closed, while_closed};
+use crate::procedures::loops::{controls, until_ring_is_closed, while_closed};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::ring::RingState;
 use crate::segment::Segment;
@@ -71,11 +71,7 @@ async fn close_ports<T>(
         return None;
     }
     let is_closed = bus.links() == LinkSet::Ring && bus.ring() == RingState::Closed;
-    let (result, is_restored) = while_closed(bus, segment, &before, ports, work).await;
-    if !is_restored {
-        // A port that is out of reach opens by itself. Until then SubDevices behind it would count as removed.
-        until_expired(bus, before.iter().map(|(station, _)| *station)).await;
-    }
+    let (result, _) = while_closed(bus, segment, &before, ports, work).await;
     if is_closed {
         until_ring_is_closed(bus, CLOSING).await;
     }
