@@ -309,7 +309,8 @@ pub enum Event {
         /// The value, the data of the elements, or the contents.
         data: Vec<u8>,
     },
-    /// A SubDevice sent a CoE emergency (protocol 6.3). The mailbox of each SubDevice also keeps its last ones.
+    /// A SubDevice sent a CoE emergency (protocol 6.3). The mailbox of each SubDevice also keeps those that were
+    /// not taken, as many as fit.
     Emergency {
         /// The SubDevice: before activation by its position.
         subdevice: Address,

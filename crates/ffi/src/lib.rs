@@ -26,6 +26,7 @@ mod code;
 mod domain_words;
 mod draft;
 mod environment;
+mod given_time;
 mod host;
 mod information;
 mod locks;

@@ -10,7 +10,8 @@ use std::time::Duration;
 use ringcat::daemon::{ClientError, OwnershipWatch};
 use ringcat::network::LoadedNetwork;
 use ringcat::{
-    ClockDatagrams, Declaration, DomainId, LastOutputs, Link, Links, LiveStatus, ReferenceClock, Services, SubDeviceId,
+    ClockDatagrams, Declaration, DomainId, Instant, LastOutputs, Link, Links, LiveStatus, ReferenceClock, Services,
+    SubDeviceId,
 };
 
 use crate::active::{Active, Slot};
@@ -19,6 +20,7 @@ use crate::claim::Claim;
 use crate::code::{Code, Outcome, report};
 use crate::draft::Draft;
 use crate::environment::socket;
+use crate::given_time::{Given, passed_since};
 use crate::host::{check_memory, variable, watch_forks};
 use crate::locks::locked;
 use crate::responder::{DaemonResponder, Responder};
@@ -71,8 +73,8 @@ pub struct Master {
     live: RwLock<Option<(LiveStatus, Option<OwnershipWatch>)>>,
     /// The last time of the application; 0 before.
     application_time: AtomicU64,
-    /// When it was given, before activation.
-    given_at: Mutex<Option<std::time::Instant>>,
+    /// Times before activation.
+    given: Mutex<Given>,
     /// Memory of images that no application uses.
     memory: Mutex<Vec<&'static mut [u8]>>,
 }
@@ -99,7 +101,7 @@ impl Master {
             application: Claim::new(Slot::Empty),
             live: RwLock::default(),
             application_time: AtomicU64::new(0),
-            given_at: Mutex::default(),
+            given: Mutex::default(),
             memory: Mutex::default(),
         })
     }
@@ -288,10 +290,12 @@ impl Master {
         };
         application.set_clock_datagrams(ClockDatagrams::Called);
         let now = application.now();
-        if let Some(given_at) = locked(&self.given_at).take() {
-            let passed = u64::try_from(given_at.elapsed().as_nanos()).unwrap_or(u64::MAX);
-            let time = self.application_time.load(Ordering::Relaxed).wrapping_add(passed);
-            application.set_application_time(time, now);
+        let Given { first, last } = std::mem::take(&mut *locked(&self.given));
+        if let Some((time, at)) = first {
+            application.set_first_application_time(time, Instant(now.0.saturating_sub(passed_since(at))));
+        }
+        if let Some((time, at)) = last {
+            application.set_application_time(time.wrapping_add(passed_since(at)), now);
         }
         self.follow_live_status(bus);
         let begun = Active::new(application, self.has_clock.load(Ordering::Relaxed), bus.ownership());
@@ -342,11 +346,11 @@ impl Master {
         };
         bus.give_links_back(ended.links);
         *draft = Draft::default();
-        draft.set_found(bus.found()?);
         self.application_time.store(0, Ordering::Relaxed);
-        *locked(&self.given_at) = None;
+        *locked(&self.given) = Given::default();
         self.follow_live_status(&bus);
         self.is_active.store(false, Ordering::Release);
+        draft.set_found(bus.found()?);
         Ok(())
     }
 
@@ -445,7 +449,7 @@ impl Master {
         self.check_reserved()?;
         self.application_time.store(time, Ordering::Relaxed);
         if !self.is_active() {
-            *locked(&self.given_at) = (time != 0).then(std::time::Instant::now);
+            locked(&self.given).set(time);
         }
         self.cycle(|Active { application, .. }| {
             let now = application.now();

@@ -29,6 +29,13 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.cyclic.exchange.set_application_time(time_ns, now);
     }
 
+    /// The first time of the application, in nanoseconds, that it had at an earlier moment, such as before this
+    /// application began: the grid of SYNC pulses begins with it (`PulseGrid`). To be called before
+    /// [`Application::set_application_time`].
+    pub fn set_first_application_time(&mut self, time_ns: u64, at: Instant) {
+        self.cyclic.exchange.set_first_application_time(time_ns, at);
+    }
+
     /// Chooses when the datagrams of distributed clocks take effect; in each cycle unless chosen otherwise.
     pub fn set_clock_datagrams(&mut self, policy: ClockDatagrams) {
         self.cyclic.exchange.set_clock_datagrams(policy);

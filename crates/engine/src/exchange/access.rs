@@ -173,6 +173,12 @@ impl Exchange {
         self.evidence.clocks.set_application_time(time, now);
     }
 
+    /// A first time of the application that it had at an earlier moment: the grid of SYNC pulses begins with it
+    /// (`PulseGrid`). To be called before [`Exchange::set_application_time`].
+    pub fn set_first_application_time(&mut self, time: u64, at: Instant) {
+        self.board.clocks.times.post_application_time(time, at.0);
+    }
+
     /// The application's time.
     pub fn application_time(&self, now: Instant) -> u64 {
         self.evidence.clocks.application_time(now)

@@ -36,7 +36,7 @@ pub struct ReceivedEmergency {
     pub emergency: Emergency,
 }
 
-/// The last emergencies of one SubDevice. Copies are handles to the same ring, for any thread.
+/// Emergencies of one SubDevice: the oldest that were not taken; more are counted. Copies are handles to the same ring, for any thread.
 #[derive(Clone, Debug)]
 pub struct EmergencyRing {
     shared: Arc<Slots>,
@@ -64,7 +64,9 @@ impl EmergencyRing {
     /// Number of emergencies that it holds.
     pub fn len(&self) -> usize {
         let read = self.shared.read.load(Ordering::Acquire);
-        self.shared.written.load(Ordering::Acquire).saturating_sub(read) as usize
+        // A reader may take some between both.
+        let count = self.shared.written.load(Ordering::Acquire).saturating_sub(read) as usize;
+        count.min(self.size())
     }
 
     /// Whether it holds none.

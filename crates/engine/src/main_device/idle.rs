@@ -10,6 +10,7 @@ use crate::procedures::deactivate::{Remainder, deactivate};
 use crate::procedures::loops::restore_within;
 use crate::procedures::scan::ScanOptions;
 use crate::procedures::services::ServiceError;
+use crate::procedures::stop::StopError;
 use crate::role::{Function, MainDevicePhase, MainDeviceRole};
 use crate::segment::{Addressed, Found, IdleObservation, Observation, ReadPdos, Scan, UndeclaredObservation};
 use crate::time::Instant;
@@ -111,10 +112,15 @@ impl MainDevice {
             segment.observe_idle(IdleObservation::Deactivating);
             segment.observe_idle(IdleObservation::Begun);
         }
+        let scan = segment.view().scan_number();
         self.supervisor.spawn(async move {
-            let left = restore_within(&bus, &segment, limit).await;
-            let result = deactivate(&bus, &segment, &options, remainder, left).await;
-            *slot.borrow_mut() = Some(result);
+            let work = async {
+                let left = restore_within(&bus, &segment, limit).await;
+                deactivate(&bus, &segment, &options, remainder, left).await
+            };
+            // Another application sets other states, a scan gives addresses: nothing is brought to PREOP any more.
+            let result = segment.unless(|model| model.is_active() || model.has_another_scan(scan), work).await;
+            *slot.borrow_mut() = Some(result.unwrap_or(Err(StopError::Ended)));
             if is_kept {
                 segment.observe_idle(IdleObservation::Deactivated);
             }

@@ -11,6 +11,7 @@ mod startup;
 use alloc::format;
 use alloc::rc::Rc;
 use alloc::vec;
+use core::cell::Cell;
 use core::time::Duration;
 
 use ringcat_wire::address::StationAddress;
@@ -52,6 +53,8 @@ pub(super) struct BringUp<'a> {
     pub config: Rc<SubDeviceConfig>,
     pub target: AlState,
     pub mailbox: Mailbox,
+    /// Its SYNC signals were started although its clock was not right in time.
+    pub goes_on_unlocked: Cell<bool>,
 }
 
 impl BringUp<'_> {
@@ -242,7 +245,8 @@ impl BringUp<'_> {
         let limit = self.config.limit(AlState::PreOp, AlState::SafeOp);
         if let Some(signals) = &self.config.sync {
             let member = (self.index, self.attempt);
-            clocks::start_signals(self.bus, self.segment, member, self.station, signals, limit).await?;
+            let start = clocks::start_signals(self.bus, self.segment, member, self.station, signals, limit);
+            self.goes_on_unlocked.set(start.await?);
         }
         Ok(())
     }
@@ -250,7 +254,8 @@ impl BringUp<'_> {
     /// Commands of SO; waits until clocks are locked and outputs flow, then OP.
     pub(super) async fn op(&self) -> Result<(), ConfigureError> {
         self.command(Transition::So).await?;
-        if self.config.sync.is_some() {
+        // The wait for its clock is over already if it goes on without.
+        if self.config.sync.is_some() && !self.goes_on_unlocked.take() {
             let member = (self.index, self.attempt);
             clocks::wait_for_lock(self.bus, self.segment, member).await.map_err(ConfigureError::NotLocked)?;
         }

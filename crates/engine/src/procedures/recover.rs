@@ -4,6 +4,7 @@
 use alloc::boxed::Box;
 use alloc::format;
 use alloc::string::ToString;
+use core::cell::Cell;
 use core::future::{Future, poll_fn};
 use core::pin::{Pin, pin};
 use core::task::Poll;
@@ -176,6 +177,7 @@ pub(super) fn bring_up<'a>(
         config: member.config.clone(),
         target: member.target,
         mailbox: segment.mailbox(index).ok_or(ConfigureError::NoSetup)?,
+        goes_on_unlocked: Cell::new(false),
     })
 }
 

@@ -42,6 +42,8 @@ pub enum StopError {
     NotPermitted(NotPermitted),
     /// No SubDevice answers any more.
     NoAnswer,
+    /// Another application, or a scan, has begun meanwhile.
+    Ended,
     /// Some did not reach the state in time.
     NotReached {
         /// The first of them; `None` if it was not declared.
@@ -67,6 +69,7 @@ impl fmt::Display for StopError {
             StopError::Bus(error) => error.fmt(f),
             StopError::NotPermitted(denied) => denied.fmt(f),
             StopError::NoAnswer => f.write_str("no SubDevice answers"),
+            StopError::Ended => f.write_str("it was ended by another application or a scan"),
             StopError::NotReached { subdevice, station, requested, status, code, limit, others } => {
                 match subdevice {
                     Some(subdevice) => write!(f, "SubDevice {subdevice} (station {station})")?,

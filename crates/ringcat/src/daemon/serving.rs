@@ -92,15 +92,19 @@ fn registers(length: usize) -> Result<usize, Refusal> {
 
 fn events(supervisor: &SupervisorThread, from: u64) -> Result<Answer, Error> {
     let mut since = supervisor.events_since(from)?;
-    let left = since.events.len().saturating_sub(MOST_EVENTS);
-    since.events.truncate(MOST_EVENTS);
+    // Numbers have gaps where events were not kept: those behind the last event of this answer belong to the next one.
+    if let Some(next) = since.events.get(MOST_EVENTS).map(|event| event.number) {
+        since.events.truncate(MOST_EVENTS);
+        since.next = next;
+        since.missed = next.saturating_sub(from).saturating_sub(since.events.len() as u64);
+    }
     let names = Names(Vec::new());
     let line = |event: &ringcat_engine::event::TimedEvent| EventLine {
         number: event.number,
         at_ns: event.at.0,
         text: describe(event, &names),
     };
-    let next = since.next.saturating_sub(left as u64);
+    let next = since.next;
     Ok(Answer::Events {
         epoch: since.epoch,
         missed: since.missed,

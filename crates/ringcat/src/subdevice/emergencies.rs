@@ -13,7 +13,7 @@ impl<S: Services> SubDevice<S> {
     /// ```
     /// use ringcat::{Error, SubDeviceId, SupervisorThread};
     ///
-    /// /// Prints the emergencies of a drive, of which the last 200 are kept.
+    /// /// Prints the emergencies of a drive, of which up to 200 wait.
     /// fn watch(supervisor: &SupervisorThread, drive: SubDeviceId) -> Result<(), Error> {
     ///     let emergencies = supervisor.subdevice(drive).create_emergency_ring(200)?;
     ///     while let Some(received) = emergencies.pop() {

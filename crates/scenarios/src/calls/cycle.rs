@@ -75,7 +75,11 @@ impl Ecrt {
         let now = self.now();
         match self.side.application() {
             Some(application) => application.exchange_mut().set_application_time(time, now),
-            None => self.plan.application_time = Some((time, now.0)),
+            None => {
+                self.plan.application_time = Some((time, now.0));
+                let first = self.plan.first_application_time.or(self.plan.application_time);
+                self.plan.first_application_time = first.filter(|(time, _)| *time != 0);
+            }
         }
     }
 

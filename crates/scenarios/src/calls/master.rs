@@ -230,11 +230,15 @@ impl Ecrt {
 
     fn begin(&mut self) {
         let (given, now) = (self.plan.application_time, self.now());
+        let first = self.plan.first_application_time;
         self.witness.begin();
         self.pulses_may_come = true;
         let Some(application) = self.side.application() else { return };
         let exchange = application.exchange_mut();
         exchange.set_clock_datagrams(ClockDatagrams::Called);
+        if let Some((time, at)) = first {
+            exchange.set_first_application_time(time, Instant(at));
+        }
         if let Some((time, at)) = given {
             exchange.set_application_time(time.wrapping_add(now.0.wrapping_sub(at)), now);
         }

@@ -322,3 +322,23 @@ fn unlocked_clocks_are_a_warning_after_5_s_or_a_stay_in_safeop() {
         }
     }
 }
+
+/// The clock that is too far has SYNC signals itself: it waits once, and is reported once.
+// covers: 7.3, dc-sync
+#[test]
+fn an_unlocked_clock_with_signals_of_its_own_goes_on_after_5_s_with_one_warning() {
+    let mut descriptions = clocked(4, 50);
+    descriptions[3].clock_drift_ppb = 900_000;
+    let mut world = World::with(47, wired_as("line", descriptions), &Options::default(), |scan| {
+        let mut declaration = with_clocks(scan, config().as_igh());
+        declaration.subdevices.iter_mut().for_each(|it| it.sync = Some(SyncSignals::sync0(CYCLE_NS as u32, 0)));
+        declaration
+    })
+    .expect("it can be activated");
+    let mark = world.beginning();
+    world.run_cycles(6_500);
+    assert!(world.all_in_op(), "{:?}", world.events(mark));
+    let of_last = |event: &Event| matches!(event, Event::WentOnUnlocked { subdevice: SubDeviceId(3), .. });
+    let count = world.events(mark).iter().filter(|timed| of_last(&timed.event)).count();
+    assert_eq!(count, 1, "{:?}", world.events(mark));
+}

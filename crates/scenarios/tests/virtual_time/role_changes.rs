@@ -182,6 +182,36 @@ fn an_application_ends_with_its_role_and_another_one_begins_when_it_is_active_ag
     }
 }
 
+/// The role ends a deactivation that waits for a SubDevice: idle operation goes on when it is ACTIVE again.
+// covers: 9.11, stop
+#[test]
+fn changes_are_followed_after_a_deactivation_that_the_role_has_ended() {
+    for network in networks() {
+        let (main_device, _) = idle(network);
+        let declaration = automatic(&main_device.subdevices(), CYCLE);
+        let mut application = main_device.activate(declaration).map_err(Error::from).expect("it fits");
+        (0..1_000).for_each(|_| application.cycle(|_| ()));
+        assert!(application.all_settled());
+        application.links_mut().links_mut().network_mut().apply(Fault::Hang(DeviceIndex(3), true));
+        let now = application.now();
+        application.engine_mut().start_deactivate(Duration::from_millis(150), now).expect("it is active");
+        (0..5).for_each(|_| application.cycle(|_| ()));
+        application.engine_mut().set_role(MainDeviceRole::Inactive);
+        let refused = application.deactivate(LastOutputs::Zero, LIMIT).expect_err("another one has the segment");
+        let mut engine = refused.main_device;
+        engine.links_mut().links_mut().network_mut().apply(Fault::Hang(DeviceIndex(3), false));
+        Services::set_role(&mut engine, MainDeviceRole::Active);
+        engine.attend(Duration::from_secs(1));
+        assert_eq!(statuses(&mut engine), [PREOP; KINDS.len()]);
+        while engine.pop_event().is_some() {}
+        engine.links_mut().links_mut().network_mut().apply(Fault::PowerOff(DeviceIndex(4)));
+        engine.attend(Duration::from_secs(1));
+        let events: Vec<Event> = std::iter::from_fn(|| engine.pop_event()).map(|timed| timed.event).collect();
+        let is_change = |event: &Event| matches!(event, Event::SegmentChanged { .. });
+        assert!(events.iter().any(is_change), "{events:?}");
+    }
+}
+
 // covers: 9.11
 #[test]
 fn a_scan_and_a_stop_that_the_role_ends_have_a_result_that_says_so() {

@@ -62,7 +62,8 @@ fn clock_of(segment: &SharedSegment, member: usize) -> Option<StationAddress> {
     segment.view().clocks().of_member(member).map(|node| node.station)
 }
 
-/// Programs the SYNC unit and starts it. The clock must be approximately right by then.
+/// Programs the SYNC unit and starts it. The clock must be approximately right by then; true if the SubDevice goes on
+/// although it is not. Then the time limit of the lock counts.
 pub(in crate::procedures) async fn start_signals(
     bus: &Bus,
     segment: &SharedSegment,
@@ -70,7 +71,11 @@ pub(in crate::procedures) async fn start_signals(
     station: StationAddress,
     signals: &SyncSignals,
     limit: Duration,
-) -> Result<(), SignalsError> {
+) -> Result<bool, SignalsError> {
+    let limit = match segment.view().clocks() {
+        clocks if clocks.goes_on_unlocked(false) => limit.min(clocks.config.lock_limit),
+        _ => limit,
+    };
     let key = segment.view().clocks().node_at(station).map(Node::key);
     let are_starting = |are_starting: bool| {
         key.into_iter().for_each(|key| segment.observe_clocks(ClockObservation::Signals { key, are_starting }));
@@ -79,7 +84,7 @@ pub(in crate::procedures) async fn start_signals(
     bus.fpwr(station, map::DC_ACTIVATION, &[0]).await?;
     are_starting(false);
     let result = wait_until_about_right(bus, segment, member, limit).await;
-    or_go_on(segment, (member, attempt), result).map_err(SignalsError::NotLocked)?;
+    let goes_on = or_go_on(segment, (member, attempt), result).map_err(SignalsError::NotLocked)?;
     bus.fpwr(station, map::DC_CYCLIC_UNIT_CONTROL, &[control]).await?;
     let sync1 = signals.active_sync1_ns();
     let mut cycles = [0; 8];
@@ -95,7 +100,8 @@ pub(in crate::procedures) async fn start_signals(
     let cycle = whole_cycle(signals.sync0_cycle_ns, sync1);
     let start = first_pulse(earliest, cycle, i64::from(signals.sync0_shift_ns) + grid_ns(segment, cycle));
     bus.fpwr(station, map::DC_START_TIME, &start.to_le_bytes()).await?;
-    Ok(bus.fpwr(station, map::DC_ACTIVATION, &[activation]).await?)
+    bus.fpwr(station, map::DC_ACTIVATION, &[activation]).await?;
+    Ok(goes_on)
 }
 
 /// Nanoseconds between the multiples of a cycle in system time and the grid of the pulses.
@@ -104,21 +110,24 @@ fn grid_ns(segment: &SharedSegment, cycle: u64) -> i64 {
         PulseGrid::SystemTime => None,
         PulseGrid::FirstApplicationTime => segment.board.clocks.times.first(),
     };
-    let shift = segment.view().clocks().shift();
-    begin.and_then(|begin| begin.wrapping_sub(shift).checked_rem(cycle)).map_or(0, |ns| ns as i64)
+    // The system time may have been far behind the application's, or before it.
+    let shift = segment.view().clocks().shift() as i64;
+    let phase = |begin: u64| (i128::from(begin) - i128::from(shift)).checked_rem_euclid(i128::from(cycle));
+    begin.and_then(phase).map_or(0, |ns| ns as i64)
 }
 
 /// What follows from clocks that are not locked in time: the model decides whether the member goes on, and reports it.
+/// True if it goes on without.
 fn or_go_on(
     segment: &SharedSegment,
     (member, attempt): (usize, u32),
     result: Result<(), NotLocked>,
-) -> Result<(), NotLocked> {
-    let Err(not_locked) = result else { return Ok(()) };
+) -> Result<bool, NotLocked> {
+    let Err(not_locked) = result else { return Ok(false) };
     let (reason, is_hidden) = (not_locked.to_string(), not_locked.hidden.is_some());
     let versions = segment.view().clock_versions();
     segment.find_of_clocks(versions, ClockFinding::NotLocked { member, attempt, reason, is_hidden });
-    if segment.view().clocks().goes_on_unlocked(is_hidden) { Ok(()) } else { Err(not_locked) }
+    if segment.view().clocks().goes_on_unlocked(is_hidden) { Ok(true) } else { Err(not_locked) }
 }
 
 async fn wait_until_about_right(
@@ -167,7 +176,7 @@ pub(in crate::procedures) async fn wait_for_lock(
         if is_locked { Ok(()) } else { Err(NotLocked { waited: limit, difference_ns, window_ns, other, hidden }) }
     };
     let result = wait(bus, segment, limit, check).await;
-    or_go_on(segment, (member, attempt), result)
+    or_go_on(segment, (member, attempt), result).map(drop)
 }
 
 /// Waits until clocks pass a check; the error is the result of the check at the time limit.

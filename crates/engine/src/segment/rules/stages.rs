@@ -6,7 +6,7 @@ use alloc::string::{String, ToString};
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::segment::effect::{Effect, Effects, Task, Watch};
-use crate::segment::idle::Comparison;
+use crate::segment::idle::{Comparison, Work};
 use crate::segment::key::SubDeviceKey;
 use crate::segment::model::{Declared, Segment};
 use crate::segment::scan::{Found, Scan};
@@ -134,6 +134,8 @@ impl Segment {
     /// follow at once.
     pub(in crate::segment) fn deactivate(&mut self, effects: &mut Effects) {
         self.board.post_end();
+        // All procedures have ended, a former deactivation too.
+        self.idle.work = Work::Nothing;
         let scanned = self.stage.scanned().cloned();
         let subdevices = scanned.as_ref().map(|it| SubDevices::of_scan(&it.found)).unwrap_or_default();
         let stage = scanned.map_or(Stage::Unscanned, |it| Stage::Scanned(Scanned { registers: Start::Doubtful, ..it }));

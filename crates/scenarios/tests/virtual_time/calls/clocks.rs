@@ -2,6 +2,7 @@
 //! the application.
 
 use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::fault::Fault;
 use ringcat_sim::network::NetworkOptions;
 use ringcat_wire::register::{DcSystemTimeDifference, map};
 use scenarios::calls::errno::Errno;
@@ -189,7 +190,7 @@ fn a_jump_from_monotonic_to_real_time_in_op_is_followed_within_3_s() {
             ecrt.activate().expect("it fits");
             ecrt.cycle_until_op(WITH_CLOCKS).unwrap_or_else(|error| panic!("{count}: {error}"));
             ecrt.cycles(8_000);
-            let mut pulses = Pulses::new(ecrt.network(), synced, CYCLE_NS.into());
+            let mut pulses = Pulses::new(ecrt.network(), synced.clone(), CYCLE_NS.into());
             let phase = |pulses: &Pulses, base: u64| {
                 let next = pulses.devices()[0].next.expect("it pulses").0;
                 next.wrapping_add(base) as i64 - time as i64
@@ -214,8 +215,62 @@ fn a_jump_from_monotonic_to_real_time_in_op_is_followed_within_3_s() {
             assert!(worst <= 1_000 && apart <= 1_000, "{text}: {worst} ns, {apart} ns");
             assert!(fewest >= PHASE as u64 + 495, "{text}: {fewest} pulses");
             assert!(ecrt.is_running(), "{text}: {}", ecrt.describe());
+            // One that starts its signals in the new time pulses with the others.
+            if let Some(last) = synced.last().filter(|last| **last > 0) {
+                ecrt.network().apply(Fault::PowerOff(DeviceIndex(*last)));
+                ecrt.cycles(100);
+                ecrt.network().apply(Fault::PowerOn(DeviceIndex(*last)));
+                ecrt.cycle_until_op(WITH_CLOCKS).unwrap_or_else(|error| panic!("{text}: {error}"));
+                ecrt.cycles(4_000);
+                let apart = apart_ns(&mut ecrt, &synced);
+                assert!(apart <= 1_000, "{text}: {apart} ns apart after a return");
+            }
             ecrt.deactivate().expect("all follow");
             assert_idle(&mut ecrt, &text);
+        }
+    }
+}
+
+/// Largest distance of the pulses of devices within some cycles.
+fn apart_ns(ecrt: &mut Ecrt, devices: &[usize]) -> u64 {
+    let mut pulses = Pulses::new(ecrt.network(), devices.to_vec(), CYCLE_NS.into());
+    let mut apart = 0;
+    for _ in 0..100 {
+        ecrt.cycle();
+        pulses.observe(ecrt.network());
+        apart = apart.max(pulses.apart_ns().expect("all pulse"));
+    }
+    apart
+}
+
+/// Programs set their time before they activate: pulses begin with the first one, not with the time of the activation.
+// covers: 7.3, api, dc-sync
+#[test]
+fn pulses_begin_with_the_first_time_that_was_set_before_the_activation() {
+    const SHIFT: i32 = 250_000;
+    for (count, mut ecrt) in requested().filter(|(count, _)| [1, 12].contains(count)) {
+        for is_set_twice in [false, true] {
+            let (_, configs) = configure(&mut ecrt, 0..count);
+            ecrt.dc(configs[0], ASSIGN, CYCLE_NS, SHIFT);
+            let first = ecrt.application_clock();
+            ecrt.application_time(first);
+            ecrt.pause(std::time::Duration::from_nanos(1_234_567));
+            if is_set_twice {
+                let time = ecrt.application_clock();
+                ecrt.application_time(time);
+                ecrt.pause(std::time::Duration::from_nanos(345_678));
+            }
+            ecrt.activate().expect("it fits");
+            ecrt.cycle_until_op(WITH_CLOCKS).unwrap_or_else(|error| panic!("{count}: {error}"));
+            ecrt.cycles(4_000);
+            let pulses = Pulses::new(ecrt.network(), vec![0], CYCLE_NS.into());
+            let next = pulses.devices()[0].next.expect("it pulses").0.wrapping_add(ecrt.clock_base);
+            let cycle = i64::from(CYCLE_NS);
+            let off = (next as i64 - first as i64 - i64::from(SHIFT)).rem_euclid(cycle);
+            let off = off.min(cycle - off);
+            assert!(off <= 20_000, "{count}, set twice {is_set_twice}: {off} ns from the phase");
+            ecrt.deactivate().expect("all follow");
+            assert_idle(&mut ecrt, &format!("{count}, {is_set_twice}"));
         }
     }
 }

@@ -1,0 +1,47 @@
+//! Times of the application that it has set before its activation.
+
+use std::time::Instant;
+
+/// A time, and when it was set.
+type At = (u64, Instant);
+
+/// Times before activation. The first one begins the grid of SYNC pulses; the application's time goes on from the last
+/// one.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Given {
+    /// The first one that is not 0.
+    pub first: Option<At>,
+    /// The last one; `None` if that is 0.
+    pub last: Option<At>,
+}
+
+impl Given {
+    /// The application sets a time now.
+    pub fn set(&mut self, time: u64) {
+        self.last = (time != 0).then(|| (time, Instant::now()));
+        self.first = self.first.or(self.last);
+    }
+}
+
+/// Nanoseconds since then.
+pub fn passed_since(at: Instant) -> u64 {
+    u64::try_from(at.elapsed().as_nanos()).unwrap_or(u64::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // covers: dc-sync, ecrt
+    #[test]
+    fn the_first_time_begins_the_grid_and_the_last_one_goes_on() {
+        let mut given = Given::default();
+        given.set(0);
+        assert!(given.first.is_none() && given.last.is_none());
+        given.set(7);
+        given.set(9);
+        assert_eq!((given.first.map(|it| it.0), given.last.map(|it| it.0)), (Some(7), Some(9)));
+        given.set(0);
+        assert_eq!((given.first.map(|it| it.0), given.last), (Some(7), None));
+    }
+}
