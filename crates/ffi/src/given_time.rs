@@ -32,7 +32,7 @@ pub fn passed_since(at: Instant) -> u64 {
 mod tests {
     use super::*;
 
-    // covers: dc-sync, ecrt
+    // covers: dc-sync, c-interface
     #[test]
     fn the_first_time_begins_the_grid_and_the_last_one_goes_on() {
         let mut given = Given::default();

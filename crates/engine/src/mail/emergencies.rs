@@ -36,7 +36,8 @@ pub struct ReceivedEmergency {
     pub emergency: Emergency,
 }
 
-/// Emergencies of one SubDevice: the oldest that were not taken; more are counted. Copies are handles to the same ring, for any thread.
+/// Emergencies of one SubDevice: the oldest that were not taken; more are counted. Copies are handles to the same ring,
+/// for any thread.
 #[derive(Clone, Debug)]
 pub struct EmergencyRing {
     shared: Arc<Slots>,
