@@ -64,7 +64,7 @@ const WAITS: [(&str, &[Reason]); 41] = [
     ("procedures/mail_watch.rs", &[Cyclic]),
     ("procedures/mirror.rs", &[Cyclic]),
     ("procedures/presence.rs", &[Register]),
-    ("procedures/recover.rs", &[Retry, Retry]),
+    ("procedures/recover.rs", &[Retry, Retry, Retry]),
     ("procedures/resume.rs", &[Retry]),
     ("procedures/sample.rs", &[Cyclic]),
     ("procedures/scan.rs", &[Register]),

@@ -75,11 +75,13 @@ impl Slot {
 pub struct Active {
     /// The application.
     pub application: App,
-    /// The last call of send.
+    /// The last call of send that distributed time.
     sent_at: Instant,
-    /// The call of send before that one: what is read from its frame is not old, whether or not the domain was
-    /// processed since the last call of receive.
+    /// The one before: what is read from its frame is not old, whether or not the domain was processed since the last
+    /// call of receive.
     awaited: Instant,
+    /// The next call of send distributes time.
+    distributes: bool,
     has_clock: bool,
     /// Of a bus from a daemon.
     ownership: Option<OwnershipWatch>,
@@ -89,7 +91,7 @@ impl Active {
     /// An application that has not sent anything.
     pub fn new(application: App, has_clock: bool, ownership: Option<OwnershipWatch>) -> Active {
         let now = application.now();
-        Active { application, sent_at: now, awaited: now, has_clock, ownership }
+        Active { application, sent_at: now, awaited: now, distributes: false, has_clock, ownership }
     }
 
     #[inline(always)]
@@ -105,13 +107,21 @@ impl Active {
             if self.application.pauses() {
                 return;
             }
-            self.awaited = self.sent_at;
-            self.sent_at = self.application.now();
+            if std::mem::take(&mut self.distributes) {
+                self.awaited = self.sent_at;
+                self.sent_at = self.application.now();
+            }
         }
         self.application.send();
     }
 
-    /// The time of the reference clock, if one of the last two frames has returned with it.
+    /// The next call of send distributes time.
+    pub fn sync_clocks(&mut self) {
+        self.application.sync_clocks();
+        self.distributes = true;
+    }
+
+    /// The time of the reference clock, if one of the last two frames that distributed time has returned.
     pub fn reference_time(&self) -> Option<u64> {
         let read = self.application.exchange().reference_time()?;
         (read.sent_at >= self.awaited).then_some(read.time)

@@ -185,12 +185,18 @@ impl Draft {
     /// # Errors
     /// The SubDevice was found and has no clock.
     pub fn choose_reference(&mut self, index: Option<usize>) -> Outcome {
-        let info = index.and_then(|index| self.info(index));
-        if info.is_some_and(|info| info.receive_times.is_none()) {
-            return Err(Code::INVALID);
-        }
+        self.check_reference(index)?;
         self.reference = index;
         Ok(())
+    }
+
+    /// Checks a reference clock; `None`: the first SubDevice with a clock.
+    ///
+    /// # Errors
+    /// The SubDevice was found and has no clock.
+    pub fn check_reference(&self, index: Option<usize>) -> Outcome {
+        let info = index.and_then(|index| self.info(index));
+        if info.is_some_and(|info| info.receive_times.is_none()) { Err(Code::INVALID) } else { Ok(()) }
     }
 
     /// Whether the bus has a SubDevice with a clock.

@@ -472,7 +472,7 @@ impl Master {
         if !self.is_active() {
             return self.change(|draft| draft.choose_reference(index));
         }
-        self.check_reserved()?;
+        self.look(|draft| draft.check_reference(index))??;
         let reference =
             index.map_or(ReferenceClock::FirstWithClock, |index| ReferenceClock::Declared(SubDeviceId(index)));
         let chosen = self.bus()?.supervisor().choose_reference_clock(reference);

@@ -34,6 +34,9 @@ pub(crate) const CLOCK_DATA: usize = 4;
 /// Beyond this difference the reference is not steered: its control loop would take more than a tenth of a second, and
 /// the clocks that follow it could not. The supervisor sets all clocks, or continues with another shift.
 const FAR_NS: i64 = 100_000;
+/// A reading that is older than this says nothing of a reference that was steered since: it has the time that was
+/// written.
+const OLD_NS: u64 = 100_000_000;
 /// Event requests in the header of a datagram.
 const IRQ_AT: usize = HEADER_LEN - 2;
 
@@ -304,7 +307,7 @@ impl Clocks {
     /// The system time has jumped since the references were read.
     #[cold]
     fn move_times(&mut self, jump: u64) {
-        let times = self.times.iter_mut().chain([&mut self.last]).flatten();
+        let times = self.times.iter_mut().chain([&mut self.last, &mut self.led]).flatten();
         times.for_each(|time| time.time = time.time.wrapping_add(jump));
         self.written_epoch = self.written_epoch.map(|written| written.wrapping_add(jump));
     }
@@ -370,7 +373,7 @@ impl Clocks {
         self.wanted_epoch = epoch;
         board.clocks.times.post_wanted(epoch, shift);
         let time = application.wrapping_sub(shift);
-        let own = self.times[leader.index()];
+        let own = self.times[leader.index()].filter(|own| now.0.saturating_sub(own.sent_at.0) <= OLD_NS).or(self.led);
         let is_far = own.is_some_and(|own| is_far(own.at(now).wrapping_sub(time) as i64));
         if is_far && !self.is_far {
             board.clocks.times.wake_supervisor();

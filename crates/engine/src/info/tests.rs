@@ -344,3 +344,36 @@ proptest! {
         info.warnings.iter().for_each(|warning| drop(warning.to_string()));
     }
 }
+
+/// Two terminals of one type look alike without a serial number; their modules and parameters may differ.
+// covers: 5.1, api
+#[test]
+fn pdos_of_a_dictionary_are_certain_only_with_the_same_serial_number() {
+    let info = |revision: u32, serial: u32, pdo_source: PdoSource, pdos: Vec<PdoInfo>| SubDeviceInfo {
+        identity: Identity { vendor_id: 2, product_code: 7, revision, serial },
+        pdo_source,
+        pdos,
+        ..SubDeviceInfo::default()
+    };
+    let pdos = |index: u16| {
+        let (direction, name, entries) = (Direction::Inputs, String::new(), Vec::new());
+        vec![PdoInfo { index, direction, sync_manager: Some(3), name, flags: 0, entries }]
+    };
+    let read = pdos(0x1A00);
+    let known = |serial| info(1, serial, PdoSource::Dictionary, read.clone());
+    for (revision, serial, before, expected, is_kept) in [
+        (1, 5, 5, PdoSource::Dictionary, true),
+        (1, 6, 5, PdoSource::Outdated, true),
+        (1, 0, 0, PdoSource::Outdated, true),
+        (2, 5, 5, PdoSource::Sii, false),
+    ] {
+        let mut found = info(revision, serial, PdoSource::Sii, Vec::new());
+        found.keep_dictionary(&known(before));
+        assert_eq!((found.pdo_source, !found.pdos.is_empty()), (expected, is_kept), "{revision}, {serial}, {before}");
+    }
+    // What was read of this one counts more.
+    let own = pdos(0x1A01);
+    let mut found = info(1, 5, PdoSource::Dictionary, own.clone());
+    found.keep_dictionary(&known(5));
+    assert_eq!((found.pdo_source, found.pdos), (PdoSource::Dictionary, own));
+}

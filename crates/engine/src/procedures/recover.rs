@@ -11,7 +11,7 @@ use core::task::Poll;
 use core::time::Duration;
 
 use ringcat_wire::address::StationAddress;
-use ringcat_wire::al::AlState;
+use ringcat_wire::al::{AlState, AlStatusCode};
 
 use super::al_state;
 use super::configure::{BringUp, ConfigureError, RegisterFailure, StartupError};
@@ -78,6 +78,12 @@ pub(super) async fn keep_up(
                 Box::pin(frame_limit::explain(bus, segment)).await;
                 segment.observe_member((index, attempt), MemberFinding::Failed(problem(&error)));
             }
+            // A request of another program, or of a procedure that had ended, came between: the SubDevice was not in
+            // the state before the requested one.
+            Err(error) if has_fallen(&error) && !core::mem::replace(&mut disturbed, true) => {
+                bus.sleep(READ_PAUSE).await;
+                continue;
+            }
             // A repetition is useless with the same EEPROM, which is read again when the SubDevice comes back, or on
             // request.
             Err(error @ ConfigureError::Unfit(_)) => {
@@ -136,6 +142,18 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
         | ConfigureError::Absent
         | ConfigureError::Interrupted => false,
     }
+}
+
+/// The SubDevice has refused a state because it was not in the one before (AL status code 0x0011).
+fn has_fallen(error: &ConfigureError) -> bool {
+    let ConfigureError::State(al_state::StateError::Refused { requested, status, code }) = error else { return false };
+    let before = match requested {
+        AlState::SafeOp => AlState::PreOp,
+        AlState::Op => AlState::SafeOp,
+        AlState::Init | AlState::PreOp | AlState::Boot => return false,
+    };
+    let is_between = status.al_state().is_some_and(|state| state == before || state == *requested);
+    *code == AlStatusCode::INVALID_STATE_CHANGE && !is_between
 }
 
 /// Whether a SubDevice answers. While frames are lost this is unknown, and it counts as present.

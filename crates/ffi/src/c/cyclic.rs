@@ -160,8 +160,7 @@ unsafe extern "C" fn ecrt_master_sync_reference_clock_to(master: *mut ec_master_
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_master_sync_slave_clocks(master: *mut ec_master_t) -> c_int {
-    let sync =
-        |MasterObject(owner): &MasterObject| with_clock(&owner.master, |active| active.application.sync_clocks());
+    let sync = |MasterObject(owner): &MasterObject| with_clock(&owner.master, |active| active.sync_clocks());
     // SAFETY: a handle of the library (ecrt.h).
     unsafe { call(master, sync) }
 }

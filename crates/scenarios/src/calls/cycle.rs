@@ -189,6 +189,15 @@ impl Ecrt {
         (0..count).for_each(|_| self.cycle());
     }
 
+    /// Some cycles of a loop that exchanges no process data, and gives no time.
+    pub fn cycles_without_time(&mut self, count: usize) {
+        for _ in 0..count {
+            self.receive();
+            self.send();
+            self.pause(PERIOD);
+        }
+    }
+
     /// Runs the usual loop until all configured SubDevices are in OP and all domains are complete.
     ///
     /// # Errors

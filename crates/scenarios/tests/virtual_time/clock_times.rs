@@ -30,7 +30,7 @@ pub fn network(kind: &str, count: usize) -> Network {
     wired_as(kind, clocked(count, 50))
 }
 
-fn wired_as(kind: &str, descriptions: Vec<DeviceDescription>) -> Network {
+pub fn wired_as(kind: &str, descriptions: Vec<DeviceDescription>) -> Network {
     match kind {
         "line" => line(descriptions, NetworkOptions::default()),
         "tree" => clock_tree(descriptions),
@@ -183,6 +183,24 @@ fn pulses_go_on_through_a_jump_of_the_application_time_and_reach_their_phase_in_
     }
 }
 
+/// A choice counts at any time, also while delays are measured.
+// covers: 7.5, dc-reference
+#[test]
+fn another_reference_is_chosen_during_the_set_up_of_the_clocks() {
+    for (kind, count) in [("line", 10), ("tree", 10), ("ring", 10)] {
+        for begun in [0, 1, 2, 5, 20, 60] {
+            let mut world = world(49, network(kind, count), config());
+            world.run_cycles(begun);
+            let choice = ReferenceClock::Declared(SubDeviceId(4));
+            let position = world.application_mut().choose_reference_clock(choice);
+            assert_eq!(position.map(|position| position.0), Some(4), "{kind}, after {begun} cycles");
+            lock(&mut world, Duration::from_secs(3));
+            let reference = world.application().engine().clocks().iter().position(|clock| clock.is_reference);
+            assert_eq!(reference, Some(4), "{kind}, after {begun} cycles");
+        }
+    }
+}
+
 /// Another reference while pulses run: pulses go on, and all clocks follow the chosen one.
 // covers: 7.5, dc-reference
 #[test]
@@ -278,6 +296,39 @@ fn clocks_follow_calls_and_run_free_without() {
         let (apart, error, is_steered) = run(true, enough);
         println!("{text}: {apart} ns apart, {error} ns from the application's time by calls");
         assert!(apart <= 500 && error.abs() <= 30_000 && is_steered, "{text}: {apart} ns, {error} ns");
+    }
+}
+
+/// Nothing is read of the reference: it has the time that was written last. The application's time runs 300 ppm faster
+/// than the host's, and jumps in the end.
+// covers: 7.4, dc-reference
+#[test]
+fn a_reference_that_alone_is_called_for_follows_a_time_that_drifts() {
+    for (kind, count) in SEGMENTS.into_iter().take(4) {
+        let mut world = world(48, network(kind, count), config());
+        world.application_mut().exchange_mut().set_clock_datagrams(ClockDatagrams::Called);
+        let mut host = Host { base: EPOCH };
+        let mut run = |host: &mut Host, cycles: u64, distributes: bool| {
+            for _ in 0..cycles {
+                host.base += 300;
+                let (time, now) = (host.time(&world), world.application().now());
+                let exchange = world.application_mut().exchange_mut();
+                exchange.set_application_time(time, now);
+                exchange.sync_reference(now);
+                if distributes {
+                    exchange.sync_clocks();
+                }
+                world.cycle();
+            }
+            host.error_ns(&world)
+        };
+        let error = run(&mut host, 8_000, true);
+        assert!(error.abs() <= 30_000, "{kind} of {count}: {error} ns with readings");
+        let error = run(&mut host, 8_000, false);
+        assert!(error.abs() <= 30_000, "{kind} of {count}: {error} ns without readings");
+        host.base += 7_000_000;
+        let error = run(&mut host, 8_000, false);
+        assert!(error.abs() <= 30_000, "{kind} of {count}: {error} ns after a jump");
     }
 }
 

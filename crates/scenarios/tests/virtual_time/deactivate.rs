@@ -10,8 +10,9 @@ use ringcat::{
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::{Network, NetworkOptions};
-use ringcat_wire::al::{AlState, AlStatus, AlStatusCode};
+use ringcat_wire::al::{AlControl, AlState, AlStatus, AlStatusCode};
 use ringcat_wire::register::{Fmmu, map};
+use scenarios::calls::faults::write_as_another;
 use scenarios::segments::{SIXTEEN, descriptions, line, ring};
 use scenarios::tap::Tap;
 use scenarios::witness::Witness;
@@ -250,6 +251,28 @@ fn a_failed_configuration_waits_for_a_request_with_that_policy() {
         cycles(&mut application, 100);
         assert!(application.all_settled());
     }
+}
+
+/// As when a bus is handed over: a SubDevice that refuses a state because it is in INIT is configured once more.
+// covers: stop, refused-states
+#[test]
+fn a_late_request_of_another_program_ends_no_configuration() {
+    const FAST: Duration = Duration::from_micros(100);
+    let mut refused = 0;
+    for (network, late) in (0..250).flat_map(|late| networks().map(|network| (network, late))) {
+        let (main_device, scan) = scanned(network, &Options::default().with_retries(Retries::OnRequest));
+        let mut application = activate(main_device, automatic(&scan.subdevices, FAST));
+        cycles(&mut application, late);
+        let init = AlControl::new(AlState::Init).encode();
+        (0..6).for_each(|at| write_as_another(application.links_mut().network_mut(), at, map::AL_CONTROL, &init));
+        let since = application.now();
+        while !application.all_settled() && application.now() < since + Duration::from_secs(2) {
+            application.cycle(|_| ());
+        }
+        assert!(application.all_settled(), "after {late} cycles: {:?}", application.states());
+        refused += refusals(&mut application);
+    }
+    println!("{refused} refusals");
 }
 
 // covers: stop

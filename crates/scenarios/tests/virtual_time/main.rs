@@ -14,6 +14,7 @@ mod clock_disturbances;
 mod clock_forks;
 mod clock_jitter;
 mod clock_jumps;
+mod clock_power;
 mod clock_shifts;
 mod clock_times;
 mod clocks;

@@ -19,6 +19,8 @@ use crate::supervisor::{Bus, BusError};
 const AHEAD_NS: u64 = 100_000_000;
 /// Largest difference of the clock at which signals are started (protocol 7.2: as IgH does).
 const GOOD_ENOUGH_NS: u32 = 10_000;
+/// Maximum wait for the first time of an application whose time begins the grid of the pulses.
+const GIVEN_LIMIT: Duration = Duration::from_secs(1);
 /// Maximum wait for the measurement of a segment that changes repeatedly.
 const MEASURING_LIMIT: Duration = Duration::from_secs(1);
 
@@ -85,6 +87,7 @@ pub(in crate::procedures) async fn start_signals(
     are_starting(false);
     let result = wait_until_about_right(bus, segment, member, limit).await;
     let goes_on = or_go_on(segment, (member, attempt), result).map_err(SignalsError::NotLocked)?;
+    until_time_is_given(bus, segment).await;
     bus.fpwr(station, map::DC_CYCLIC_UNIT_CONTROL, &[control]).await?;
     let sync1 = signals.active_sync1_ns();
     let mut cycles = [0; 8];
@@ -102,6 +105,17 @@ pub(in crate::procedures) async fn start_signals(
     bus.fpwr(station, map::DC_START_TIME, &start.to_le_bytes()).await?;
     bus.fpwr(station, map::DC_ACTIVATION, &[activation]).await?;
     Ok(goes_on)
+}
+
+/// Waits for the first time of the application if the grid of the pulses begins with it: signals that are started
+/// before and after it would have different grids.
+async fn until_time_is_given(bus: &Bus, segment: &SharedSegment) {
+    let until = bus.now() + GIVEN_LIMIT;
+    let begins_with_it = segment.view().clocks().config.pulse_grid == PulseGrid::FirstApplicationTime;
+    while begins_with_it && segment.board.clocks.times.first().is_none() && bus.now() < until {
+        let posted = bus.posted();
+        segment.until_posted(posted, until, || false).await;
+    }
 }
 
 /// Nanoseconds between the multiples of a cycle in system time and the grid of the pulses.

@@ -24,9 +24,7 @@ use super::set_up::{measure_again, set_filters, set_up, write_delays};
 use super::slide::slide;
 use crate::link::Link;
 use crate::procedures::shared_segment::SharedSegment;
-use crate::segment::clocks::{
-    Answer, Answers, ClockFinding, ClockKey, ClockObservation, ClockVersions, Difference, Due, Node,
-};
+use crate::segment::clocks::{Answer, Answers, ClockFinding, ClockObservation, ClockVersions, Difference, Due, Node};
 use crate::segment::{Changes, Observation};
 use crate::supervisor::{Bus, Reply};
 use crate::time::Instant;
@@ -46,6 +44,8 @@ const EXPLAINED: Duration = Duration::from_millis(20);
 const AGAIN: Duration = Duration::from_millis(20);
 /// If a segment cannot be measured for this time, time is distributed with the old delays.
 const PATIENCE: Duration = Duration::from_secs(1);
+/// Bytes from DC_SYSTEM_TIME_OFFSET to DC_SYSTEM_TIME_DIFFERENCE.
+const DIFFERENCE_BEHIND_OFFSET: usize = 12;
 /// Clocks before a reference that are read with it in one frame.
 const IN_A_FRAME: usize = 32;
 
@@ -175,17 +175,27 @@ async fn measure_once(bus: &Bus, segment: &SharedSegment, since: Instant) {
 /// Reads all differences, and executes the resulting actions.
 async fn read_all(bus: &Bus, segment: &SharedSegment, is_explained: bool) {
     let versions = segment.view().clock_versions();
-    let keys: Vec<ClockKey> = {
-        let view = segment.view();
-        view.clocks().nodes.iter().filter(|node| node.has_clock).map(Node::key).collect()
-    };
-    let answers = bus.gather(keys, |bus, key| async move {
-        let target = Target::Station(key.station, map::DC_SYSTEM_TIME_DIFFERENCE);
+    let clocks = segment.view().clocks().to_read();
+    let answers = bus.gather(clocks, |bus, (key, offset_ns)| async move {
+        let (register, before) = match offset_ns {
+            Some(_) => (map::DC_SYSTEM_TIME_OFFSET, DIFFERENCE_BEHIND_OFFSET),
+            None => (map::DC_SYSTEM_TIME_DIFFERENCE, 0),
+        };
         // Including DC_SPEED_COUNTER_START and DC_SPEED_COUNTER_DIFFERENCE. A lost frame gives no information.
-        let reply = bus.transfer(Command::Fprd, target, vec![0; 8], Some(Wkc(1))).await.ok()?;
-        Some((key, decode(&reply)))
+        let target = Target::Station(key.station, register);
+        let reply = bus.transfer(Command::Fprd, target, vec![0; before + 8], Some(Wkc(1))).await.ok()?;
+        let answer = decode(&reply, before);
+        let read = reply.data.first_chunk().map(|low| u32::from_le_bytes(*low));
+        let offset = offset_ns.zip(read).filter(|_| answer.link.is_some());
+        Some((key, answer, offset))
     });
-    let mut answers: Answers = answers.await.into_iter().flatten().collect();
+    let answers: Vec<_> = answers.await.into_iter().flatten().collect();
+    for (key, _, offset) in &answers {
+        if let Some((written_ns, read)) = *offset {
+            segment.find_of_clocks(versions, ClockFinding::OffsetRead { key: *key, written_ns, read });
+        }
+    }
+    let mut answers: Answers = answers.into_iter().map(|(key, answer, _)| (key, answer)).collect();
     read_in_front(bus, segment, &mut answers).await;
     segment.find_of_clocks(versions, ClockFinding::Answers { answers: &answers, is_explained });
     let due = segment.view().clocks().due();
@@ -213,13 +223,15 @@ async fn read_all(bus: &Bus, segment: &SharedSegment, is_explained: bool) {
     write_missed(bus, segment).await;
 }
 
-fn decode(reply: &Reply) -> Answer {
+/// The registers of the difference begin at an offset.
+fn decode(reply: &Reply, at: usize) -> Answer {
     let link = match (reply.main.0, reply.redundant.0) {
         (0, 0) => return Answer::default(),
         (0, _) => Link::Redundant,
         _ => Link::Main,
     };
-    let Some([a, b, c, d, start @ .., e, f]) = reply.data.first_chunk::<8>() else {
+    let registers = reply.data.get(at..).and_then(<[u8]>::first_chunk::<8>);
+    let Some([a, b, c, d, start @ .., e, f]) = registers else {
         return Answer { link: Some(link), ..Answer::default() };
     };
     let start = DcSpeedCounterStart(u16::from_le_bytes(*start));

@@ -24,7 +24,8 @@ impl Drop for UnderWay {
 }
 
 /// Registers that bytes are about to be written from a register on, until the returned value is dropped. `None` if the
-/// write does not concern ports that are followed: those of a junction with a ring, or changed for a measurement.
+/// write does not concern lasting settings of ports. A measurement that changes ports may begin while the write is
+/// under way: so it counts also where nothing follows the ports yet.
 pub(crate) fn ordering(
     segment: Option<&SharedSegment>,
     station: StationAddress,
@@ -32,9 +33,6 @@ pub(crate) fn ordering(
     data: &[u8],
 ) -> Option<UnderWay> {
     let segment = segment?;
-    if !segment.view().follows_ports(station) {
-        return None;
-    }
     let mut bytes = segment.view().control_of(station).encode();
     let begin = usize::from(register.0);
     let mut is_written = false;

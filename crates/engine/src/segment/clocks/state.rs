@@ -229,6 +229,17 @@ impl Clocks {
         lacking.map(|node| node.station).collect()
     }
 
+    /// Clocks that are read next, and the offset of those that answer again, or after a change: they may have lost
+    /// their registers.
+    pub fn to_read(&self) -> Vec<(ClockKey, Option<i64>)> {
+        let is_in_doubt = |node: &Node| {
+            let is_set = node.unit.is_some() && !node.is_unset && !node.missed_offset;
+            is_set && (node.link.is_none() || self.doubtful_since().is_some())
+        };
+        let with_clock = self.nodes.iter().filter(|node| node.has_clock);
+        with_clock.map(|node| (node.key(), is_in_doubt(node).then_some(node.offset_ns))).collect()
+    }
+
     /// The common pattern of the SYNC signals that run; `None` without any. A declared pattern counts also if it does
     /// not run yet.
     pub(in crate::segment) fn running_pattern(&self) -> Option<u64> {

@@ -64,6 +64,10 @@ impl Segment {
         self.board.clocks.post_references(self.clocks.references());
         self.report_reference(effects);
         self.report_hidden(effects);
+        if self.clocks.elect(|_| true) != self.clocks.reference {
+            // Another one was chosen meanwhile.
+            self.observe_choice(self.clocks.config.reference, effects);
+        }
         self.compensate(effects);
     }
 

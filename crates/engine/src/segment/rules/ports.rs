@@ -25,11 +25,6 @@ impl Segment {
         self.port_controls.iter().find(|entry| entry.station == junction)
     }
 
-    /// Whether commands to the ports of a SubDevice are stored.
-    pub fn follows_ports(&self, station: StationAddress) -> bool {
-        self.port_control(station).is_some() || self.junctions().contains(&station)
-    }
-
     /// The SubDevices with ports that are changed for a moment, and the settings to restore: those that the application
     /// has ordered by now.
     pub fn altered(&self) -> Vec<(StationAddress, DlControl)> {

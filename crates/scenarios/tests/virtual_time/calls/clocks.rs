@@ -36,11 +36,7 @@ fn sync_pulses_run_with_the_application_and_end_with_it() {
             }
             ecrt.activate().expect("it fits");
             // Without any time for a while, then in each cycle.
-            for _ in 0..loops_first {
-                ecrt.receive();
-                ecrt.send();
-                ecrt.pause(scenarios::calls::cycle::PERIOD);
-            }
+            ecrt.cycles_without_time(loops_first);
             let time = ecrt.cycle_until_op(WITH_CLOCKS).unwrap_or_else(|error| panic!("{count}: {error}"));
             let before = pulses(&mut ecrt);
             ecrt.cycles(100);
@@ -271,6 +267,31 @@ fn pulses_begin_with_the_first_time_that_was_set_before_the_activation() {
             assert!(off <= 20_000, "{count}, set twice {is_set_twice}: {off} ns from the phase");
             ecrt.deactivate().expect("all follow");
             assert_idle(&mut ecrt, &format!("{count}, {is_set_twice}"));
+        }
+    }
+}
+
+/// The time is given first when all are on their way to SAFEOP: what starts then, and what starts later, has one grid.
+// covers: 7.3, api, dc-sync
+#[test]
+fn pulses_that_start_before_and_after_the_first_time_have_one_grid() {
+    for (count, mut ecrt) in requested().filter(|(count, _)| *count == 12) {
+        for without in [20, 100, 300] {
+            let (_, configs) = configure(&mut ecrt, 0..count);
+            let synced: Vec<usize> = with_clock(&mut ecrt);
+            synced.iter().for_each(|at| ecrt.dc(configs[*at], ASSIGN, CYCLE_NS, 250_000));
+            let last = *synced.last().filter(|last| **last > 0).expect("two clocks");
+            ecrt.network().apply(Fault::PowerOff(DeviceIndex(last)));
+            ecrt.activate().expect("it fits");
+            ecrt.cycles_without_time(without);
+            ecrt.cycles(400);
+            ecrt.network().apply(Fault::PowerOn(DeviceIndex(last)));
+            ecrt.cycle_until_op(WITH_CLOCKS).unwrap_or_else(|error| panic!("{without}: {error}"));
+            ecrt.cycles(4_000);
+            let apart = apart_ns(&mut ecrt, &synced);
+            assert!(apart <= 1_000, "{count}, {without} cycles without a time: {apart} ns apart");
+            ecrt.deactivate().expect("all follow");
+            assert_idle(&mut ecrt, &format!("{count}, {without}"));
         }
     }
 }

@@ -200,8 +200,13 @@ impl Segment {
             return;
         }
         node.losses = node.losses.wrapping_add(1);
+        // It was measured without them, or is going to be.
+        let is_known = node.is_unset && node.unit.is_some();
         (node.is_unset, node.latches_backwards, node.filter_depths) = (true, false, None);
         node.has_signals = false;
+        if is_known {
+            return;
+        }
         if self.clocks.reference == Some(key.station) {
             self.clocks.refer_to(None);
         }
