@@ -334,3 +334,45 @@ fn a_deactivation_keeps_its_limit_when_the_host_cable_is_cut_during_it() {
         }
     }
 }
+
+/// Ports of neighbours were closed by order of the application: they can be opened without it, and by the next one.
+// covers: stop, registers
+#[test]
+fn ports_that_were_closed_by_order_can_be_opened_after_the_application() {
+    for is_next in [false, true] {
+        for network in networks() {
+            let (main_device, scan) = scanned(network, &Options::default());
+            let mut declaration = automatic(&scan.subdevices, CYCLE);
+            declaration.subdevices.iter_mut().for_each(|config| config.optional = true);
+            let mut application = activate(main_device, declaration.clone());
+            settle(&mut application);
+            let mut block = application.engine_mut().start_block(SubDeviceId(4));
+            cycles(&mut application, 300);
+            let blocked = block.take().expect("it has ended").expect("it has neighbours").len();
+            let mut ended = application.deactivate(LastOutputs::Zero, LIMIT).expect("all others follow");
+            assert!(closed(ended.links_mut().network()) == blocked);
+            let mut application = if is_next {
+                let mut application = activate(ended, declaration);
+                let mut open = application.engine_mut().start_open_blocked();
+                cycles(&mut application, 300);
+                assert_eq!(open.take(), Some(Ok(blocked)));
+                application
+            } else {
+                let mut open = ended.engine_mut().start_open_blocked();
+                ended.attend(Duration::from_millis(100));
+                assert_eq!(open.take(), Some(Ok(blocked)));
+                activate(ended, declaration)
+            };
+            assert_eq!(closed(application.links_mut().network()), 0);
+            settle(&mut application);
+            cycles(&mut application, 300);
+            assert_eq!(application.states()[4], SubDeviceState::Settled(AlState::Op));
+        }
+    }
+}
+
+/// Number of ports that are set to be closed.
+fn closed(network: &Network) -> usize {
+    let loops = network.devices().map(|device| device.controller.register(map::DL_CONTROL.offset(1), 1)[0]);
+    loops.map(|loops| (0..4).filter(|port| loops >> (2 * port) & 3 == 3).count()).sum()
+}

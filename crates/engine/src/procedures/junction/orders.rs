@@ -26,12 +26,11 @@ impl Drop for UnderWay {
 /// Registers that bytes are about to be written from a register on, until the returned value is dropped. `None` if the
 /// write does not concern ports that are followed: those of a junction with a ring, or changed for a measurement.
 pub(crate) fn ordering(
-    segment: Option<&SharedSegment>,
+    segment: &SharedSegment,
     station: StationAddress,
     register: RegisterAddress,
     data: &[u8],
 ) -> Option<UnderWay> {
-    let segment = segment?;
     if !segment.view().follows_ports(station) {
         return None;
     }
