@@ -158,9 +158,9 @@ fn numbers_of_events_go_on_after_a_stop_and_a_new_scan() {
     assert_eq!(engine.events_since(0).missed, 0, "the events before the stop are kept");
 }
 
-/// Runs an application that fetches no event, with cycles whose frames are lost: each of them is an event, and so is the
-/// next one that returns. The number of the first of these events, and their count; `asked` gets all that a client has
-/// read that asks after so many cycles.
+/// Runs an application that fetches no event, with cycles whose frames are lost: each is an event, and so is the next
+/// one that returns. The number of the first of these events, and their count; `asked` gets all that a client has read
+/// that asks after so many cycles.
 fn disturbed(cycles: u64, ask: u64, asked: &mut Vec<EventsSince>) -> (Application<Tap>, u64, u64) {
     let network = ring(descriptions(&KINDS), NetworkOptions::default());
     let mut main_device = MainDevice::request(Tap::new(network), &Options::default());
