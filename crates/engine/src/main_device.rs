@@ -131,10 +131,6 @@ use crate::time::Instant;
 use loaded::Loaded;
 use memories::Memories;
 
-/// Unfetched events at which those of the cyclic half wait in their queue, unless clients have queues of their own: a
-/// quarter of the log.
-const UNFETCHED: usize = 1024;
-
 type StopSlot = Rc<RefCell<Option<Result<(), StopError>>>>;
 
 /// The MainDevice without its cyclic half.
@@ -153,7 +149,7 @@ pub struct MainDevice {
     stopped: StopSlot,
     segment: SharedSegment,
     cyclic_events: Option<Consumer>,
-    /// Cyclic events that were lost before they were numbered.
+    /// Cyclic events that were lost in their queue and have numbers.
     cyclic_events_lost: u64,
     requests: Requests,
     /// Emergencies of all SubDevices.
@@ -286,33 +282,36 @@ impl MainDevice {
         *self.stopped.borrow()
     }
 
-    /// Events of both halves that were dropped because they were not fetched in time.
+    /// Events of both halves that were dropped because they were not fetched in time. The number only grows.
     pub fn events_dropped(&self) -> u64 {
-        self.supervisor.events_dropped() + self.cyclic_events.as_ref().map_or(0, Consumer::dropped)
+        let in_queue = self.cyclic_events.as_ref().map_or(0, Consumer::dropped);
+        self.supervisor.events_dropped() + in_queue.saturating_sub(self.cyclic_events_lost)
     }
 
-    /// The events of both halves from a number on, also those that were fetched: for a client that was away. The last
-    /// 4,096 events are kept.
+    /// The events of both halves from a number on, also those that were fetched: for a client that was away. 4,096
+    /// events are kept: the last ones, but of the cyclic half no more than the last 1,024 in the place of others.
     pub fn events_since(&mut self, number: u64) -> EventsSince {
         self.number_cyclic_events(self.supervisor.bus().now());
         self.supervisor.events_since(number)
     }
 
-    /// Takes the events of the cyclic half into the log, as long as they leave room for those of the acyclic half.
+    /// Takes the events of the cyclic half into the log. Those that its queue had no room for are numbered as well.
     fn number_cyclic_events(&mut self, now: Instant) {
         let Some(cyclic) = self.cyclic_events.as_mut() else { return };
-        while self.supervisor.has_event_clients() || self.supervisor.events_unfetched() < UNFETCHED {
-            let Some(words) = cyclic.pop() else { return };
-            let lost = cyclic.dropped();
-            if let Some(event) = CyclicEvent::unpack(words) {
+        self.supervisor.with_events(|log| {
+            while let Some(words) = cyclic.pop() {
+                let Some(event) = CyclicEvent::unpack(words) else { continue };
                 #[cfg(feature = "standby")]
                 let event = standby::named(&self.standby, event);
                 #[cfg(not(feature = "standby"))]
                 let event = event.event();
-                self.supervisor.append_event(now, event, lost - self.cyclic_events_lost);
-                self.cyclic_events_lost = lost;
+                log.push_cyclic(now, event);
             }
-        }
+            // They were raised after those that had filled the queue.
+            let lost = cyclic.dropped();
+            log.skip(lost.saturating_sub(self.cyclic_events_lost));
+            self.cyclic_events_lost = lost;
+        });
     }
 
     /// The present state of each declared SubDevice.

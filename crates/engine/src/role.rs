@@ -107,7 +107,7 @@ functions! {
     ForceTopologyChange,
     /// Loop control of a port.
     PortState,
-    /// A SubDevice cut off by the ports of its neighbours, and these ports opened again.
+    /// A declared SubDevice cut off by the ports of its neighbours, and these ports opened again.
     BlockedPorts,
     /// Reset of a controller.
     ControllerReset,
@@ -221,10 +221,10 @@ impl Function {
             F::AoeAccess | F::VendorMessage | F::RawMailbox | F::Ethernet => ALWAYS,
             F::SubDeviceState | F::StateOfAll | F::ForcedState | F::RawDatagrams | F::DebugMessage => ALWAYS,
             F::Registers | F::Eeprom | F::EepromOwner | F::PortState | F::ControllerReset | F::PortReport => ALWAYS,
-            F::SiiCompletion | F::Rescan | F::Stop | F::SubDeviceInfo => ALWAYS,
+            F::SiiCompletion | F::Rescan | F::Stop | F::SubDeviceInfo | F::BlockedPorts => ALWAYS,
             F::Status | F::OwnObjects | F::Events | F::Settings => ALWAYS,
             F::Scan | F::Activate | F::Follow => WITHOUT,
-            F::ForceTopologyChange | F::BlockedPorts | F::Statistics | F::Deactivate => ACTIVE,
+            F::ForceTopologyChange | F::Statistics | F::Deactivate => ACTIVE,
         }
     }
 

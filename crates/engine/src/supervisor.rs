@@ -241,16 +241,10 @@ impl Supervisor {
         self.shared.borrow_mut().events = events;
     }
 
-    /// Appends an event of the other half. `lost`: events of that half that were lost before it.
-    pub(crate) fn append_event(&mut self, at: Instant, event: Event, lost: u64) {
-        let events = &mut self.shared.borrow_mut().events;
-        events.skip(lost);
-        events.push(at, event);
-    }
-
-    /// Number of events that the application has not fetched.
-    pub(crate) fn events_unfetched(&self) -> usize {
-        self.shared.borrow().events.unfetched()
+    /// Appends an event.
+    #[cfg(feature = "standby")]
+    pub(crate) fn append_event(&mut self, at: Instant, event: Event) {
+        self.shared.borrow_mut().events.push(at, event);
     }
 
     /// Works with the log of events.
@@ -269,17 +263,12 @@ impl Supervisor {
         shared.debug_messages.queue(sources, ethertype, text, shared.now)
     }
 
-    /// Whether there are clients of events with queues of their own.
-    pub(crate) fn has_event_clients(&self) -> bool {
-        self.shared.borrow().events.has_clients()
-    }
-
     /// The kept events from a number on.
     pub fn events_since(&self, number: u64) -> EventsSince {
         self.shared.borrow().events.since(number)
     }
 
-    /// Number of events that were dropped because the application did not fetch them.
+    /// Number of events that were dropped because the application did not fetch them, or lost before they were numbered.
     pub fn events_dropped(&self) -> u64 {
         self.shared.borrow().events.dropped()
     }

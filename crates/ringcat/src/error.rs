@@ -93,7 +93,7 @@ impl fmt::Display for Error {
             Error::TimedOut { limit } => write!(f, "not done within {} ms", limit.as_millis()),
             Error::Stop(error @ StopError::Bus(BusError::Lost { .. })) => write!(
                 f,
-                "stop: no frame comes back on any interface, so no SubDevice was brought to INIT: they keep their \
+                "stop: no frame comes back on any interface, so no SubDevice was brought down: they keep their \
                  states until their watchdogs expire. Are the cables of the host unplugged? ({error})"
             ),
             Error::Stop(error) => write!(f, "stop: {error}"),

@@ -24,7 +24,8 @@ pub struct ClientId(u32);
 pub struct ClientEvents {
     /// The events, oldest first, with the numbers that all clients see.
     pub events: Vec<TimedEvent>,
-    /// Number of events that did not fit: they were older than these.
+    /// Number of events that did not fit: they were older than these. Events that were lost before they had a subject
+    /// are counted as well.
     pub missed: u64,
 }
 
@@ -77,9 +78,9 @@ impl Clients {
         Some(ClientEvents { events: client.queue.drain(..).collect(), missed })
     }
 
-    /// Whether there is a client.
-    pub fn is_any(&self) -> bool {
-        !self.all.is_empty()
+    /// Events of unknown subjects were lost.
+    pub fn miss(&mut self, lost: u64) {
+        self.all.iter_mut().for_each(|client| client.missed += lost);
     }
 
     /// Queues an event for each client that asked for its subject.
@@ -123,8 +124,10 @@ mod tests {
         let events = clients.take(all).expect("it is registered");
         assert_eq!((numbers(&events), events.missed), (alloc::vec![3, 4, 5], 3));
         assert_eq!(clients.take(all), Some(ClientEvents::default()));
+        clients.miss(2);
+        assert_eq!(clients.take(all), Some(ClientEvents { missed: 2, ..ClientEvents::default() }));
         let events = clients.take(links).expect("it is registered");
-        assert_eq!((numbers(&events), events.missed), (alloc::vec![5], 0));
+        assert_eq!((numbers(&events), events.missed), (alloc::vec![5], 2));
         assert!(clients.set_subjects(links, Subjects::NONE.with(Subject::Domains)));
         clients.queue(&skipped(6));
         assert_eq!(clients.take(links).map(|events| numbers(&events)), Some(alloc::vec![6]));

@@ -2,7 +2,7 @@
 //! clients that were disconnected. The log is bounded: the oldest events are dropped, and dropped events that were not
 //! fetched are counted.
 
-use alloc::collections::VecDeque;
+use alloc::collections::{VecDeque, vec_deque};
 use alloc::vec::Vec;
 
 use super::clients::{ClientEvents, ClientId, Clients};
@@ -18,6 +18,8 @@ use crate::time::Instant;
 const FOREIGN_KEPT: usize = 8;
 /// Events kept, fetched or not; beyond, the oldest is dropped.
 const KEPT: usize = 4096;
+/// Events of the cyclic half among them that may take the place of others.
+const CYCLIC_KEPT: usize = KEPT / 4;
 
 /// The events from a number on, as far as they are kept.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -33,13 +35,43 @@ pub struct EventsSince {
     pub next: u64,
 }
 
-/// Events, oldest first.
+/// Kept events of one half, oldest first.
+#[derive(Debug, Default)]
+struct Kept {
+    events: VecDeque<TimedEvent>,
+    /// Number of events in front that the application has fetched.
+    fetched: usize,
+}
+
+impl Kept {
+    /// The number of the oldest event, and that of the oldest one that was not fetched; the largest number without one.
+    fn fronts(&self) -> [u64; 2] {
+        [0, self.fetched].map(|at| self.events.get(at).map_or(u64::MAX, |event| event.number))
+    }
+
+    fn from(&self, number: u64) -> vec_deque::Iter<'_, TimedEvent> {
+        self.events.range(self.events.partition_point(|event| event.number < number)..)
+    }
+
+    /// Drops the oldest event; returns it if it was not fetched.
+    fn drop_oldest(&mut self) -> Option<TimedEvent> {
+        let oldest = self.events.pop_front();
+        match self.fetched {
+            0 => oldest,
+            _ => {
+                self.fetched -= 1;
+                None
+            }
+        }
+    }
+}
+
+/// Events of both halves. A fault that is an event in each cycle takes only a part of the room.
 #[derive(Debug, Default)]
 pub struct EventLog {
     epoch: u64,
-    kept: VecDeque<TimedEvent>,
-    /// Number of events in front that the application has fetched.
-    fetched: usize,
+    acyclic: Kept,
+    cyclic: Kept,
     /// Events since the beginning: the number of the next one.
     next: u64,
     foreign: usize,
@@ -85,6 +117,16 @@ impl EventLog {
 
     /// Appends an event with given SubDevices.
     pub fn push_of(&mut self, at: Instant, event: Event, occupants: [Option<Occupant>; 2]) {
+        self.append(at, event, occupants, false);
+    }
+
+    /// Appends an event of the cyclic half.
+    pub fn push_cyclic(&mut self, at: Instant, event: Event) {
+        let occupants = self.occupants(event.positions());
+        self.append(at, event, occupants, true);
+    }
+
+    fn append(&mut self, at: Instant, event: Event, occupants: [Option<Occupant>; 2], is_cyclic: bool) {
         self.history.note(at, &event);
         let number = self.next;
         self.next += 1;
@@ -95,12 +137,13 @@ impl EventLog {
             }
             self.foreign += 1;
         }
-        if self.kept.len() >= KEPT {
-            self.drop_oldest();
+        if self.acyclic.events.len() + self.cyclic.events.len() >= KEPT {
+            self.drop_oldest(is_cyclic);
         }
         let event = TimedEvent { number, at, event, occupants };
         self.clients.queue(&event);
-        self.kept.push_back(event);
+        let kept = if is_cyclic { &mut self.cyclic } else { &mut self.acyclic };
+        kept.events.push_back(event);
     }
 
     /// Messages beside the events.
@@ -128,23 +171,22 @@ impl EventLog {
         self.clients.take(client)
     }
 
-    /// Whether there is a client.
-    pub fn has_clients(&self) -> bool {
-        self.clients.is_any()
-    }
-
-    fn drop_oldest(&mut self) {
-        if self.fetched == 0 {
-            self.pop();
+    /// Drops the oldest event: of the cyclic half, if more than its part is kept of that one with the next event.
+    fn drop_oldest(&mut self, is_next_cyclic: bool) {
+        let [acyclic, cyclic] = [&self.acyclic, &self.cyclic].map(|kept| kept.fronts()[0]);
+        let is_crowded = self.cyclic.events.len() + usize::from(is_next_cyclic) > CYCLIC_KEPT;
+        let kept = if is_crowded || cyclic < acyclic { &mut self.cyclic } else { &mut self.acyclic };
+        if let Some(unfetched) = kept.drop_oldest() {
+            self.foreign -= usize::from(matches!(unfetched.event, Event::ForeignFrame { .. }));
             self.dropped += 1;
         }
-        self.kept.pop_front();
-        self.fetched = self.fetched.saturating_sub(1);
     }
 
-    /// Events that were lost before they reached the log: their numbers are missing.
+    /// Events that were lost before they reached the log: they have numbers, which are missing in it.
     pub fn skip(&mut self, lost: u64) {
         self.next += lost;
+        self.dropped += lost;
+        self.clients.miss(lost);
     }
 
     /// The diagnosis history; its messages do not depend on fetched events.
@@ -154,28 +196,31 @@ impl EventLog {
 
     /// Takes the oldest unfetched event. It stays in the log for [`EventLog::since`].
     pub fn pop(&mut self) -> Option<TimedEvent> {
-        let event = self.kept.get(self.fetched)?.clone();
-        self.fetched += 1;
+        let [acyclic, cyclic] = [&self.acyclic, &self.cyclic].map(|kept| kept.fronts()[1]);
+        let kept = if cyclic < acyclic { &mut self.cyclic } else { &mut self.acyclic };
+        let event = kept.events.get(kept.fetched)?.clone();
+        kept.fetched += 1;
         if matches!(event.event, Event::ForeignFrame { .. }) {
             self.foreign -= 1;
         }
         Some(event)
     }
 
-    /// Number of unfetched events.
-    pub fn unfetched(&self) -> usize {
-        self.kept.len() - self.fetched
-    }
-
     /// The kept events from a number on, fetched or not. A number beyond the next one gives none.
     pub fn since(&self, number: u64) -> EventsSince {
-        let first = self.kept.partition_point(|event| event.number < number);
-        let events: Vec<TimedEvent> = self.kept.range(first..).cloned().collect();
+        let [mut acyclic, mut cyclic] = [&self.acyclic, &self.cyclic].map(|kept| kept.from(number).peekable());
+        let events: Vec<TimedEvent> = core::iter::from_fn(|| {
+            let [of_acyclic, of_cyclic] =
+                [&mut acyclic, &mut cyclic].map(|kept| kept.peek().map_or(u64::MAX, |event| event.number));
+            if of_cyclic < of_acyclic { cyclic.next() } else { acyclic.next() }.cloned()
+        })
+        .collect();
         let missed = self.next.saturating_sub(number) - events.len() as u64;
         EventsSince { epoch: self.epoch, events, missed, next: self.next }
     }
 
-    /// Number of events that were dropped because the application did not fetch them.
+    /// Number of events that were dropped because the application did not fetch them, and of those that were lost before
+    /// they reached the log.
     pub fn dropped(&self) -> u64 {
         self.dropped
     }
@@ -221,6 +266,26 @@ mod tests {
     }
 
     #[test]
+    fn a_flood_of_cyclic_events_leaves_the_others_and_the_newest_of_its_own() {
+        let mut log = EventLog::default();
+        (0..100).for_each(|n| log.push(Instant(n), skipped(0)));
+        (0..2 * KEPT).for_each(|n| log.push_cyclic(Instant(100), skipped(n)));
+        (0..50).for_each(|n| log.push(Instant(n), skipped(0)));
+        let since = log.since(0);
+        let of_cyclic = since.events.iter().filter(|event| event.at == Instant(100)).count();
+        assert_eq!((since.events.len(), of_cyclic, since.next), (KEPT, KEPT - 150, 150 + 2 * KEPT as u64));
+        assert!(since.events.is_sorted_by_key(|event| event.number), "events of both halves are in order");
+        assert_eq!((since.missed, log.dropped()), (since.next - KEPT as u64, since.next - KEPT as u64));
+        (0..2 * KEPT).for_each(|n| log.push(Instant(n as u64), skipped(0)));
+        (0..2 * KEPT).for_each(|n| log.push_cyclic(Instant(100), skipped(n)));
+        let fetched: Vec<TimedEvent> = core::iter::from_fn(|| log.pop()).collect();
+        let of_cyclic = fetched.iter().filter(|event| event.at == Instant(100)).count();
+        assert_eq!((fetched.len(), of_cyclic), (KEPT, CYCLIC_KEPT));
+        assert!(fetched.is_sorted_by_key(|event| event.number));
+        assert_eq!(fetched.last().map(|event| event.number + 1), Some(log.since(0).next));
+    }
+
+    #[test]
     fn events_since_a_number_are_complete_or_say_how_many_are_missing() {
         let mut log = EventLog::new(7);
         let numbers = |since: &EventsSince| since.events.iter().map(|event| event.number).collect::<Vec<_>>();
@@ -239,7 +304,7 @@ mod tests {
         (0..KEPT).for_each(|n| log.push(Instant(10), skipped(n)));
         let rest = log.since(3);
         assert_eq!((rest.events.len(), rest.missed), (KEPT, 5));
-        assert_eq!((log.dropped(), log.pop().map(|event| event.number)), (5, Some(8)));
+        assert_eq!((log.dropped(), log.pop().map(|event| event.number)), (7, Some(8)), "two were lost, five dropped");
         let log = log.end_session();
         assert_eq!((log.since(0).next, log.since(0).epoch), (8 + KEPT as u64, 7));
     }

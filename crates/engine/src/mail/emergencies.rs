@@ -10,6 +10,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::sync::atomic::{AtomicU64, Ordering};
 
+use ringcat_wire::address::Position;
 use ringcat_wire::mailbox::coe::Emergency;
 
 use crate::declared::Address;
@@ -124,6 +125,8 @@ impl EmergencyRing {
 #[derive(Debug, Default)]
 pub(crate) struct EmergencyRings {
     rings: BTreeMap<Address, EmergencyRing>,
+    /// Rings of positions that SubDevices have left, while others have these positions.
+    left: BTreeMap<Position, EmergencyRing>,
 }
 
 impl EmergencyRings {
@@ -150,8 +153,38 @@ impl EmergencyRings {
         self.rings.remove(&subdevice);
     }
 
+    /// A SubDevice has left this position. The next one that comes there goes on with its ring.
+    pub(crate) fn leave(&mut self, position: Position, ring: EmergencyRing) {
+        self.rings.remove(&position.into());
+        self.left.insert(position, ring);
+    }
+
+    /// The ring of a SubDevice that has come to this position.
+    pub(crate) fn arrive(&mut self, position: Position) -> EmergencyRing {
+        match self.left.remove(&position) {
+            Some(ring) => {
+                self.keep(position.into(), ring.clone());
+                ring
+            }
+            None => self.of(position.into()),
+        }
+    }
+
+    /// All SubDevices have their positions: rings of positions without a SubDevice can be asked for.
+    pub(crate) fn end_changes(&mut self) {
+        let EmergencyRings { rings, left } = self;
+        left.retain(|position, ring| {
+            let is_taken = rings.contains_key(&Address::from(*position));
+            if !is_taken {
+                rings.insert((*position).into(), ring.clone());
+            }
+            is_taken
+        });
+    }
+
     /// A new scan: positions of the scan before are no longer valid.
     pub(crate) fn forget_positions(&mut self) {
+        self.left.clear();
         self.rings.retain(|subdevice, _| matches!(subdevice, Address::Declared(_)));
     }
 }

@@ -67,10 +67,10 @@ impl MainDevice {
         let bus = self.bus();
         let addressed = self.permit(Function::RawDatagrams).map_err(ServiceError::NotPermitted);
         let addressed = addressed.and_then(|()| self.addressed(datagrams));
-        let segment = self.active().cloned();
+        let segment = self.segment.clone();
         self.start(async move {
             let addressed = addressed?;
-            let _orders: Vec<_> = addressed.iter().flat_map(|(it, _)| orders(segment.as_ref(), it)).collect();
+            let _orders: Vec<_> = addressed.iter().flat_map(|(it, _)| orders(&segment, it)).collect();
             Ok(bus.gather(addressed, send).await)
         })
     }
@@ -117,16 +117,17 @@ impl MainDevice {
 }
 
 /// Port commands to junctions in a datagram.
-fn orders(segment: Option<&SharedSegment>, datagram: &RawDatagram) -> Vec<UnderWay> {
+fn orders(segment: &SharedSegment, datagram: &RawDatagram) -> Vec<UnderWay> {
     use Command::{Aprw, Apwr, Brw, Bwr, Fprw, Fpwr};
-    let Some(known) = segment.filter(|_| matches!(datagram.command, Aprw | Apwr | Brw | Bwr | Fprw | Fpwr)) else {
+    if !matches!(datagram.command, Aprw | Apwr | Brw | Bwr | Fprw | Fpwr) {
         return Vec::new();
-    };
-    let at = |place: usize| known.view().cabling().stations.get(place).copied();
+    }
+    let stations = segment.view().stations_by_position();
+    let at = |place: usize| stations.get(place).copied();
     let (stations, register) = match datagram.target {
         Target::Station(station, register) => (Vec::from([station]), register),
         Target::Position(Position(place), register) => (at(place.into()).into_iter().collect(), register),
-        Target::Broadcast(register) => (known.view().cabling().stations.clone(), register),
+        Target::Broadcast(register) => (stations.clone(), register),
         Target::Logical(_) | Target::None => return Vec::new(),
     };
     stations.into_iter().filter_map(|station| ordering(segment, station, register, &datagram.data)).collect()

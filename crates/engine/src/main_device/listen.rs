@@ -45,7 +45,7 @@ impl MainDevice {
             && standby.other_version.replace(got) != Some(got)
         {
             let event = Event::Standby(StandbyEvent::OtherVersion { got, least });
-            self.supervisor.append_event(now, event, 0);
+            self.supervisor.append_event(now, event);
         }
     }
 

@@ -93,6 +93,8 @@ impl MainDevice {
     /// idle operation only.
     ///
     /// A stop ends all rings, a new scan those of positions: they keep what they hold, and get no further emergencies.
+    /// The ring of a position follows its SubDevice to another one; after a loss of power it goes on with the SubDevice
+    /// that comes to the position.
     pub fn emergencies(&mut self, subdevice: impl Into<Address>) -> EmergencyRing {
         let subdevice = self.declared_or(subdevice);
         self.emergencies.borrow_mut().of(subdevice)

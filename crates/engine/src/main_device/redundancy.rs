@@ -86,7 +86,7 @@ impl MainDevice {
 
     /// Reports what a policy has found before there is an application.
     pub fn report_standby(&mut self, event: StandbyEvent, now: Instant) {
-        self.supervisor.append_event(now, Event::Standby(event), 0);
+        self.supervisor.append_event(now, Event::Standby(event));
     }
 
     /// SubDevices with outputs whose watchdog, as declared, is not longer than process data may be missing in a
@@ -141,7 +141,7 @@ impl MainDevice {
         let was_written = core::mem::replace(&mut standby.fits, is_written);
         if was_written && !is_written {
             let event = StandbyEvent::KnowledgeTooLong { bytes: bytes.len(), room: KNOWLEDGE_ROOM };
-            self.supervisor.append_event(now, Event::Standby(event), 0);
+            self.supervisor.append_event(now, Event::Standby(event));
         }
     }
 

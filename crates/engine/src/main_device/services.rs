@@ -116,9 +116,9 @@ impl MainDevice {
         data: Vec<u8>,
         urgency: Urgency,
     ) -> Pending<Result<(), ServiceError>> {
-        let segment = self.active().cloned();
+        let segment = self.segment.clone();
         self.start_on(Function::Registers, subdevice, move |bus, station| async move {
-            registers::write(&bus, segment.as_ref(), station, address, &data, urgency).await
+            registers::write(&bus, &segment, station, address, &data, urgency).await
         })
     }
 
@@ -140,9 +140,9 @@ impl MainDevice {
         port: u8,
         control: LoopControl,
     ) -> Pending<Result<(), ServiceError>> {
-        let segment = self.active().cloned();
+        let segment = self.segment.clone();
         self.start_on(Function::PortState, subdevice, move |bus, station| async move {
-            ports::set(&bus, segment.as_ref(), station, port, control).await
+            ports::set(&bus, &segment, station, port, control).await
         })
     }
 
@@ -155,12 +155,12 @@ impl MainDevice {
         self.start(async move { ports::block(&bus, &segment, index?).await })
     }
 
-    /// Starts to open all ports that were closed to cut SubDevices off.
+    /// Starts to open all ports that were closed to cut SubDevices off, by this application or by one before it. A
+    /// scan opens them as well.
     pub fn start_open_blocked(&mut self) -> Pending<Result<usize, ServiceError>> {
-        let (bus, segment, permitted) = (self.bus(), self.active().cloned(), self.permit(Function::BlockedPorts));
+        let (bus, segment, permitted) = (self.bus(), self.segment.clone(), self.permit(Function::BlockedPorts));
         self.start(async move {
             permitted?;
-            let segment = segment.ok_or(ServiceError::NotActive)?;
             ports::open_blocked(&bus, &segment).await
         })
     }

@@ -105,7 +105,7 @@ impl MainDevice {
             RoleRequest::Inactive => MainDeviceRole::Inactive,
             RoleRequest::HandOver => {
                 let event = Event::Standby(StandbyEvent::HandOverRefused(Partner::Absent));
-                return self.supervisor.append_event(now, event, 0);
+                return self.supervisor.append_event(now, event);
             }
         };
         if role == self.role() {
@@ -114,11 +114,11 @@ impl MainDevice {
         let write = self.memory_write_under_way().filter(|_| role == MainDeviceRole::Inactive && !is_forced);
         if let Some(write) = write {
             let event = Event::Standby(StandbyEvent::RoleRefused(write));
-            self.supervisor.append_event(now, event, 0);
+            self.supervisor.append_event(now, event);
         } else {
             self.set_role(role);
             let event = StandbyEvent::RoleChanged { role, cause: RoleCause::Requested };
-            self.supervisor.append_event(now, Event::Standby(event), 0);
+            self.supervisor.append_event(now, Event::Standby(event));
         }
     }
 
@@ -136,7 +136,7 @@ impl MainDevice {
         let last = standby.collision.replace(Collision { at: now, source: Some(source) });
         if last.is_none_or(|last| now.since(last.at) > COLLISIONS_APART) {
             let event = Event::Standby(StandbyEvent::Collision { arrived_on, source });
-            self.supervisor.append_event(now, event, 0);
+            self.supervisor.append_event(now, event);
         }
     }
 

@@ -5,10 +5,11 @@ use alloc::rc::Rc;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use ringcat_wire::address::StationAddress;
-use ringcat_wire::al::AlState;
+use ringcat_wire::address::Wkc;
+use ringcat_wire::al::{AlState, AlStatus};
 
-use super::al_state::read_status;
+use super::al_state::{StateError, read_status};
+use super::configure::ConfigureError;
 use super::idle::{nothing, scan_again};
 use super::scan::ScanOptions;
 use super::shared_segment::SharedSegment;
@@ -16,7 +17,7 @@ use super::stop::{StopError, ToStop, all_known, stop};
 use super::undeclared::settle;
 use crate::info::SubDeviceInfo;
 use crate::segment::{Observation, Segment, SubDevice, UndeclaredObservation};
-use crate::supervisor::Bus;
+use crate::supervisor::{Bus, BusError};
 use crate::time::Instant;
 
 /// Pause before the segment is scanned again while it changes.
@@ -59,12 +60,14 @@ pub(crate) async fn deactivate(
     remainder: Remainder,
     limit: Duration,
 ) -> Result<(), StopError> {
-    let until = bus.now() + limit;
+    let begun = bus.now();
+    let until = begun + limit;
     let Remainder { to_stop, known } = remainder;
     let declared = to_stop.clone();
+    let unconfirmed = StopError::Unconfirmed { requested: AlState::PreOp, limit };
     // A SubDevice that does not leave its state, or lost frames, must not use up the time that the later steps need.
     let stopping = stop(bus, to_stop, AlState::PreOp, limit / 2);
-    let stopped = bus.within(limit - limit / 4, stopping).await.unwrap_or(Err(StopError::NoAnswer));
+    let stopped = bus.within(limit - limit / 4, stopping).await.unwrap_or(Err(unconfirmed));
     // A scan that loses frames must not take longer.
     let scanning = scan_until(bus, segment, options, &known, until);
     let _ = bus.within(until.since(bus.now()), scanning).await;
@@ -72,12 +75,20 @@ pub(crate) async fn deactivate(
     let settling = settle(bus, segment);
     let time = until.since(bus.now());
     // Reading the states of the late ones belongs to the limit.
-    if bus.within(time.saturating_sub(REPORT), settling).await.is_ok() {
+    let is_settled = bus.within(time.saturating_sub(REPORT), settling).await;
+    if segment.view().kept().is_empty() {
+        // None is known any more that could confirm it.
+        return if declared.is_empty() { Ok(()) } else { stopped };
+    }
+    if is_settled == Ok(true) {
         return Ok(());
     }
-    match bus.within(until.since(bus.now()), late(bus, segment, &declared, limit)).await {
-        Ok(Some(late)) => Err(late),
-        Ok(None) | Err(_) => stopped,
+    // A refusal is certain before the limit.
+    let had = if is_settled.is_ok() { bus.now().since(begun) } else { limit };
+    match bus.within(until.since(bus.now()), late(bus, segment, &declared, had)).await {
+        Ok(Late::Others(late)) => Err(late),
+        Ok(Late::Absent) => stopped,
+        Ok(Late::Unknown) | Err(_) => stopped.and(Err(unconfirmed)),
     }
 }
 
@@ -100,13 +111,33 @@ async fn scan_until(
     }
 }
 
-/// The first SubDevice that answers and is not in PREOP.
-async fn late(bus: &Bus, segment: &SharedSegment, declared: &[ToStop], limit: Duration) -> Option<StopError> {
-    let stations: Vec<StationAddress> = segment.view().unsettled();
-    let states = bus.gather(stations, |bus, station| async move { (station, read_status(&bus, station).await) }).await;
-    let mut late = states.into_iter().filter_map(|(station, read)| Some((station, read.ok()?)));
-    let (station, (status, code)) = late.next()?;
-    let others = late.count();
+/// What the states of late SubDevices are.
+enum Late {
+    /// Some answer and are not in PREOP.
+    Others(StopError),
+    /// None answers.
+    Absent,
+    /// It cannot be read, or shows PREOP too late for a mailbox.
+    Unknown,
+}
+
+/// Reads the states of those that have not reached theirs.
+async fn late(bus: &Bus, segment: &SharedSegment, declared: &[ToStop], limit: Duration) -> Late {
+    let unsettled = segment.view().unsettled();
+    let states = bus.gather(unsettled, |bus, it| async move { (it, read_status(&bus, it.0.station).await) }).await;
+    let answers = states.iter().filter_map(|(it, read)| Some((*it, read.ok()?)));
+    let mut others = answers.filter(|(_, (status, _))| *status != AlStatus::new(AlState::PreOp));
+    let Some(((key, attempt), (status, code))) = others.next() else {
+        let is_absent = |read: &Result<_, BusError>| matches!(read, Err(BusError::Wkc { got: Wkc(0), .. }));
+        return if states.iter().all(|(_, read)| is_absent(read)) { Late::Absent } else { Late::Unknown };
+    };
+    let others = others.count();
+    let (station, requested) = (key.station, AlState::PreOp);
+    // The attempt has acknowledged its refusal.
+    let code = match segment.undeclared.result(key, attempt) {
+        Some(Err(ConfigureError::State(StateError::Refused { code, .. }))) => code,
+        Some(_) | None => code,
+    };
     let subdevice = declared.iter().find(|(_, other)| *other == station).and_then(|(subdevice, _)| *subdevice);
-    Some(StopError::NotReached { subdevice, station, requested: AlState::PreOp, status, code, limit, others })
+    Late::Others(StopError::NotReached { subdevice, station, requested, status, code, limit, others })
 }

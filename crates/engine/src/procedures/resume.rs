@@ -33,6 +33,9 @@ use crate::supervisor::{Bus, BusError};
 /// Pause between two rounds while the segment does not answer, or changes.
 const PAUSE: Duration = Duration::from_millis(2);
 
+/// Scans after which the segment may differ again, however long they take.
+const SCANS: u32 = 3;
+
 /// What another process knew.
 pub(crate) struct Before {
     /// All SubDevices with a station address: those that the scan found, then others.
@@ -143,6 +146,7 @@ async fn verified(
     let begun = bus.now();
     let mut found = before.found.clone();
     let (mut differs, mut is_released) = (false, before.handover == Handover::Orderly);
+    let mut scans = 0;
     loop {
         let mut error = ScanError::NoAnswer;
         match check(bus, &found.subdevices).await {
@@ -152,6 +156,10 @@ async fn verified(
             Ok(Check::Different { replaced, counts }) => {
                 error = ScanError::Changed { before: counts_of(&found), after: counts };
                 differs = true;
+                let within = bus.now().since(begun);
+                if scans >= SCANS && within >= options.patience {
+                    return Err(ScanError::Unstable { scans, within });
+                }
                 let all = before.all.iter().map(|known| known.info.clone());
                 let known: Vec<Rc<SubDeviceInfo>> = match found.subdevices.is_empty() {
                     true => all.collect(),
@@ -160,6 +168,7 @@ async fn verified(
                 match scan_again(bus, segment, options, (&known, &before.found)).await {
                     Ok(Some(now)) if !now.subdevices.is_empty() => {
                         found = now;
+                        scans += 1;
                         continue;
                     }
                     Ok(_) => {}

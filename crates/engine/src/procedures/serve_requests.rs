@@ -162,7 +162,7 @@ async fn register(
     bus.permit(Function::Registers).map_err(|_| RequestFailure::Failed)?;
     let result = match &order.access {
         Access::Write(data) => {
-            registers::write(bus, Some(segment), station, address, data, Urgency::InOrder).await.map(|()| None)
+            registers::write(bus, segment, station, address, data, Urgency::InOrder).await.map(|()| None)
         }
         Access::Read | Access::ReadDirectly => registers::read(bus, station, address, length.into()).await.map(Some),
     };

@@ -44,6 +44,13 @@ pub enum StopError {
     NoAnswer,
     /// Another application, or a scan, has begun meanwhile.
     Ended,
+    /// Frames were lost, or an answer was late: it is not known whether all reached the state.
+    Unconfirmed {
+        /// The requested state.
+        requested: AlState,
+        /// The time limit.
+        limit: Duration,
+    },
     /// Some did not reach the state in time.
     NotReached {
         /// The first of them; `None` if it was not declared.
@@ -56,7 +63,7 @@ pub enum StopError {
         status: AlStatus,
         /// The last AL status code; 0 if there was none.
         code: AlStatusCode,
-        /// The time limit.
+        /// The time limit, or the time after which no further attempt follows.
         limit: Duration,
         /// Number of other SubDevices that did not reach the state.
         others: usize,
@@ -70,6 +77,10 @@ impl fmt::Display for StopError {
             StopError::NotPermitted(denied) => denied.fmt(f),
             StopError::NoAnswer => f.write_str("no SubDevice answers"),
             StopError::Ended => f.write_str("it was ended by another application or a scan"),
+            StopError::Unconfirmed { requested, limit } => {
+                let limit = limit.as_millis();
+                write!(f, "not all SubDevices have confirmed {requested} within {limit} ms: frames are lost or late")
+            }
             StopError::NotReached { subdevice, station, requested, status, code, limit, others } => {
                 match subdevice {
                     Some(subdevice) => write!(f, "SubDevice {subdevice} (station {station})")?,

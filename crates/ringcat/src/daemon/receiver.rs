@@ -3,7 +3,7 @@
 use std::os::fd::{AsFd, OwnedFd};
 use std::sync::Arc;
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ringcat_control::Arriving;
 use ringcat_control::connection::Connection;
@@ -21,7 +21,7 @@ use crate::supervisor_thread::SupervisorThread;
 
 /// Stack of the thread: a program may have locked its memory, and with it this.
 const STACK_BYTES: usize = 512 << 10;
-/// Interval of checks for new events of scans.
+/// Interval of checks for new events of scans, also while messages come.
 const LOOK: Duration = Duration::from_millis(200);
 
 /// The thread that receives the messages of the daemon.
@@ -51,15 +51,18 @@ impl Receiver {
 
     fn run(self) {
         let (mut arriving, mut descriptors) = (Arriving::new(Limits::OWNER), Vec::new());
+        let mut look_at = Instant::now() + LOOK;
         loop {
-            let ready = wait_readable(&[self.connection.as_fd(), self.orders.as_fd()], LOOK);
+            let left = look_at.saturating_duration_since(Instant::now());
+            let ready = wait_readable(&[self.connection.as_fd(), self.orders.as_fd()], left);
             for order in self.orders.take() {
                 self.tell(order.into());
             }
+            if Instant::now() >= look_at {
+                self.tell_knowledge();
+                look_at = Instant::now() + LOOK;
+            }
             if ready & 1 == 0 {
-                if ready == 0 {
-                    self.tell_knowledge();
-                }
                 continue;
             }
             match self.connection.receive_part_with_descriptors(&mut arriving, &mut descriptors) {

@@ -4,6 +4,8 @@ use std::time::{Duration, Instant};
 
 use ringcat::AlState;
 use ringcat::daemon::{Answer, Query};
+use ringcat::sim::cable::DeviceIndex;
+use ringcat::sim::fault::Fault;
 
 use crate::bench::{Bench, LONG, check_bar};
 use crate::owner_process::{OwnerProcess, Work};
@@ -234,4 +236,36 @@ fn an_application_that_is_killed_and_started_again_at_once_reaches_op() {
         owner.child.kill().expect("it runs");
         owner.child.wait().expect("it has ended");
     }
+}
+
+/// A client asks for events as `ethercat events` does, so that the owner gets a message every 50 ms.
+// covers: daemon
+#[test]
+fn a_change_that_a_killed_owner_has_followed_is_known_although_a_client_asks() {
+    const LEFT: usize = 3;
+    let bench = Bench::start(LEFT + 1);
+    let mut client = bench.client();
+    let owner = OwnerProcess::start(&bench.socket, Work::Hold);
+    bench.inside(|segment| segment.network_mut().apply(Fault::PowerOff(DeviceIndex(LEFT))));
+    let (begin, mut from, mut of_owner) = (Instant::now(), 0, 0);
+    while begin.elapsed() < Duration::from_secs(3) {
+        let Answer::Events { next, epoch, .. } = crate::bench::ask(&mut client, Query::Events { from }) else {
+            panic!("they are events")
+        };
+        (from, of_owner) = (next, epoch);
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    owner.signal("-KILL");
+    let begin = Instant::now();
+    let text = loop {
+        let answer = crate::bench::ask(&mut client, Query::Events { from: 0 });
+        let Answer::Events { epoch, events, .. } = answer else { panic!("they are events") };
+        let resumed = events.into_iter().map(|event| event.text).find(|text| text.contains("another process"));
+        if let Some(text) = resumed.filter(|_| epoch != of_owner) {
+            break text;
+        }
+        assert!(begin.elapsed() < LONG, "the daemon goes on");
+        std::thread::sleep(Duration::from_millis(5));
+    };
+    assert!(text.contains("it is as known") && text.ends_with("of 3 SubDevices stay"), "{text}");
 }

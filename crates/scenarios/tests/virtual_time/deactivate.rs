@@ -357,3 +357,113 @@ fn a_deactivation_keeps_its_limit_when_the_host_cable_is_cut_during_it() {
         }
     }
 }
+
+/// It has refused PREOP before, and waits for a request with that policy.
+// covers: stop
+#[test]
+fn a_subdevice_that_refuses_preop_does_not_make_a_deactivation_last_its_limit() {
+    let code = AlStatusCode(0x8042);
+    for with_idle in [false, true] {
+        for network in networks() {
+            let options = Options::default().with_retries(Retries::OnRequest).with_idle_operation(with_idle);
+            let (mut main_device, scan) = scanned(network, &options);
+            let refuse = Fault::RefuseTransition { device: DeviceIndex(3), to: AlState::PreOp, code, times: u32::MAX };
+            main_device.links_mut().network_mut().apply(refuse);
+            let mut application = activate(main_device, automatic(&scan.subdevices, CYCLE));
+            cycles(&mut application, 500);
+            let begun = application.now();
+            let refused = application.deactivate(LastOutputs::Zero, LIMIT).expect_err("device 3 refuses PREOP");
+            let took = refused.main_device.now().since(begun);
+            assert!(took <= Duration::from_millis(100), "{took:?}");
+            let Error::Stop(StopError::NotReached { subdevice, code: said, limit, others, .. }) = refused.error else {
+                panic!("{}", refused.error)
+            };
+            assert_eq!((subdevice, said, others), (Some(SubDeviceId(3)), code, 0));
+            assert!(limit <= took, "the time that it had: {limit:?} of {took:?}");
+            let mut ended = refused.main_device;
+            let statuses = statuses(&mut ended);
+            assert!(statuses.iter().enumerate().all(|(at, status)| at == 3 || *status == PREOP), "{statuses:?}");
+        }
+    }
+}
+
+/// Ports of neighbours were closed by order of the application: they can be opened without it, and by the next one.
+// covers: stop, registers
+#[test]
+fn ports_that_were_closed_by_order_can_be_opened_after_the_application() {
+    for is_next in [false, true] {
+        for network in networks() {
+            let (main_device, scan) = scanned(network, &Options::default());
+            let mut declaration = automatic(&scan.subdevices, CYCLE);
+            declaration.subdevices.iter_mut().for_each(|config| config.optional = true);
+            let mut application = activate(main_device, declaration.clone());
+            settle(&mut application);
+            let mut block = application.engine_mut().start_block(SubDeviceId(4));
+            cycles(&mut application, 300);
+            let blocked = block.take().expect("it has ended").expect("it has neighbours").len();
+            let mut ended = application.deactivate(LastOutputs::Zero, LIMIT).expect("all others follow");
+            assert!(closed(ended.links_mut().network()) == blocked);
+            let mut application = if is_next {
+                let mut application = activate(ended, declaration);
+                let mut open = application.engine_mut().start_open_blocked();
+                cycles(&mut application, 300);
+                assert_eq!(open.take(), Some(Ok(blocked)));
+                application
+            } else {
+                let mut open = ended.engine_mut().start_open_blocked();
+                ended.attend(Duration::from_millis(100));
+                assert_eq!(open.take(), Some(Ok(blocked)));
+                activate(ended, declaration)
+            };
+            assert_eq!(closed(application.links_mut().network()), 0);
+            settle(&mut application);
+            cycles(&mut application, 300);
+            assert_eq!(application.states()[4], SubDeviceState::Settled(AlState::Op));
+        }
+    }
+}
+
+/// Number of ports that are set to be closed.
+fn closed(network: &Network) -> usize {
+    let loops = network.devices().map(|device| device.controller.register(map::DL_CONTROL.offset(1), 1)[0]);
+    loops.map(|loops| (0..4).filter(|port| loops >> (2 * port) & 3 == 3).count()).sum()
+}
+
+/// A SubDevice hangs while it is brought to PREOP, and then no frame returns.
+// covers: stop
+#[test]
+fn a_deactivation_that_no_frame_confirms_is_no_success() {
+    const SHORT: Duration = Duration::from_millis(100);
+    for after in (0..60).map(|half| Duration::from_micros(500 * half)) {
+        for network in networks() {
+            let (main_device, scan) = scanned(network, &Options::default());
+            let mut application = activate(main_device, declare(&scan, &[0, 1, 2, 3, 4, 5], false));
+            settle(&mut application);
+            let network = application.links_mut().network_mut();
+            let (begun, last) = (network.now(), network.cables().len() - 1);
+            network.schedule(begun + after, Fault::Hang(DeviceIndex(3), true));
+            let cut = begun + Duration::from_millis(60);
+            [0, last].into_iter().for_each(|cable| network.schedule(cut, Fault::Cut(CableId(cable))));
+            match application.deactivate(LastOutputs::Held, SHORT) {
+                Ok(mut ended) => assert_eq!(statuses(&mut ended), [PREOP; MIXED.len()], "it hangs after {after:?}"),
+                Err(refused) => assert!(!refused.error.to_string().contains("no SubDevice answers"), "{after:?}"),
+            }
+        }
+    }
+}
+
+// covers: stop
+#[test]
+fn a_deactivation_without_a_cable_says_that_no_frame_returns() {
+    for network in networks() {
+        let (main_device, scan) = scanned(network, &Options::default());
+        let mut application = activate(main_device, automatic(&scan.subdevices, CYCLE));
+        settle(&mut application);
+        let network = application.links_mut().network_mut();
+        let last = network.cables().len() - 1;
+        [0, last].into_iter().for_each(|cable| network.apply(Fault::Cut(CableId(cable))));
+        let refused = application.deactivate(LastOutputs::Zero, LIMIT).expect_err("no frame returns");
+        let text = refused.error.to_string();
+        assert!(text.contains("frame"), "{text}");
+    }
+}

@@ -242,3 +242,32 @@ fn emergencies_are_kept_by_position_and_wait_in_an_undeclared_subdevice() {
     (0..2000).for_each(|_| application.cycle(|_| ()));
     assert!(application.all_settled() && by_position.is_empty());
 }
+
+/// With idle operation, one device after the other; behind one without power, positions change in a ring.
+// covers: 6.3, sdo-information
+#[test]
+fn emergencies_of_a_position_go_on_after_a_power_cycle_without_a_declaration() {
+    const AT: [u16; 2] = [1, 3];
+    let kinds = ["coupler", "all-protocols", "digital-input-8", "all-protocols"];
+    for off in AT.map(|at| DeviceIndex(at.into())) {
+        for build in [line, ring] {
+            let network = build(descriptions(&kinds), NetworkOptions::default());
+            let mut main_device = MainDevice::request(Tap::new(network), &Options::default().with_idle_operation(true));
+            main_device.attend(Duration::from_millis(400));
+            let rings = AT.map(|at| main_device.subdevice(Position(at)).create_emergency_ring(5));
+            for round in 1..=3 {
+                main_device.links_mut().network_mut().apply(Fault::PowerOff(off));
+                main_device.attend(Duration::from_millis(400));
+                main_device.links_mut().network_mut().apply(Fault::PowerOn(off));
+                main_device.attend(Duration::from_secs(1));
+                for at in AT {
+                    let device = main_device.links_mut().network_mut().device_mut(DeviceIndex(at.into()));
+                    assert!(device.application.emergency(&emergency(at + round)), "{at} is in PREOP");
+                }
+                main_device.attend(Duration::from_millis(100));
+                let codes = rings.each_ref().map(|ring| ring.pop().map(|received| received.emergency.error_code));
+                assert_eq!(codes, AT.map(|at| Some(at + round)), "{off:?}, round {round}");
+            }
+        }
+    }
+}

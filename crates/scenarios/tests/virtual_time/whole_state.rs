@@ -2,15 +2,21 @@
 
 use std::time::Duration;
 
-use ringcat::{Activity, Event, EventsSince, Progress, Snapshot};
+use ringcat::{
+    Activity, Application, DomainId, Event, EventsSince, LastOutputs, MainDevice, Options, Progress, Snapshot,
+    automatic,
+};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::network::NetworkOptions;
 use scenarios::segments::{descriptions, ring};
-use scenarios::world::World;
+use scenarios::tap::Tap;
+use scenarios::world::{CYCLE, World};
 
 const KINDS: [&str; 4] = ["coupler", "digital-input-8", "all-protocols", "digital-output-8"];
 /// Events that the engine keeps.
 const KEPT: usize = 4096;
+/// Events of the cyclic half that wait until they are asked for.
+const QUEUE: u64 = 1024;
 
 fn world(seed: u64) -> World {
     let options = NetworkOptions::default().with_detection_delay(Duration::from_micros(10));
@@ -150,4 +156,84 @@ fn numbers_of_events_go_on_after_a_stop_and_a_new_scan() {
     assert_eq!((state.activity, state.epoch), (Activity::Scanned, before.epoch));
     assert!(state.next_event >= before.next_event && state.subdevices.iter().all(|one| one.declared.is_none()));
     assert_eq!(engine.events_since(0).missed, 0, "the events before the stop are kept");
+}
+
+/// Runs an application that fetches no event, with cycles whose frames are lost: each is an event, and so is the next
+/// one that returns. The number of the first of these events, and their count; `asked` gets all that a client has read
+/// that asks after so many cycles.
+fn disturbed(cycles: u64, ask: u64, asked: &mut Vec<EventsSince>) -> (Application<Tap>, u64, u64) {
+    let network = ring(descriptions(&KINDS), NetworkOptions::default());
+    let mut main_device = MainDevice::request(Tap::new(network), &Options::default());
+    let scan = main_device.scan().expect("it can be scanned");
+    let mut application = main_device.activate(automatic(&scan.subdevices, CYCLE)).expect("it fits");
+    (0..1_000).for_each(|_| application.cycle(|_| ()));
+    assert!(application.all_settled());
+    let number = application.engine_mut().snapshot().next_event;
+    application.links_mut().lose_per_mille(300, 1);
+    let (mut raised, mut last, mut next) = (0, application.process(DomainId(0)).state, number);
+    for cycle in 1..=cycles {
+        application.cycle(|_| ());
+        let state = application.process(DomainId(0)).state;
+        raised += u64::from(std::mem::replace(&mut last, state) != state);
+        if cycle % ask == 0 {
+            let since = application.engine_mut().events_since(next);
+            next = since.next;
+            asked.push(since);
+        }
+    }
+    application.links_mut().lose_per_mille(0, 1);
+    assert!(raised > cycles / 10, "{raised} of {cycles}");
+    (application, number, raised)
+}
+
+fn of_domains(since: &EventsSince) -> u64 {
+    since.events.iter().filter(|event| matches!(event.event, Event::Domain { .. })).count() as u64
+}
+
+// covers: jobs
+#[test]
+fn a_client_gets_each_event_of_a_cycle_although_the_application_fetches_none() {
+    let mut asked = Vec::new();
+    let (_, _, raised) = disturbed(12_000, 100, &mut asked);
+    assert_eq!((asked.iter().map(of_domains).sum::<u64>(), asked.len()), (raised, 120));
+    assert!(asked.iter().all(|since| since.missed == 0), "none is missed");
+}
+
+// covers: jobs
+#[test]
+fn each_event_of_a_cycle_has_a_number_although_none_asks_for_it() {
+    for cycles in [400, 3_000, 12_000] {
+        let (mut application, number, raised) = disturbed(cycles, u64::MAX, &mut Vec::new());
+        // What is not among the events was missed.
+        let since = application.engine_mut().events_since(number);
+        assert!(since.next - number >= raised, "{} numbers for {raised} events", since.next - number);
+        assert_eq!(since.events.len() as u64 + since.missed, since.next - number);
+        assert!(since.events.len() <= KEPT && since.events.is_sorted_by_key(|event| event.number));
+        assert_eq!(of_domains(&since), raised.min(QUEUE));
+        // The end of the application takes no event away, and no count.
+        let dropped = application.engine().events_dropped();
+        let ended = application.deactivate(LastOutputs::Zero, Duration::from_secs(1));
+        let mut main_device = ended.unwrap_or_else(|refused| panic!("{}", refused.error));
+        let after = main_device.engine_mut().events_since(number);
+        assert!(after.next >= since.next && main_device.engine().events_dropped() >= dropped);
+        assert!(since.events.iter().all(|event| after.events.contains(event)), "the log has room for more");
+        assert_eq!(after.events.len() as u64 + after.missed, after.next - number);
+    }
+}
+
+// covers: jobs
+#[test]
+fn the_end_of_an_application_numbers_the_events_of_its_cycles() {
+    for cycles in [400, 12_000] {
+        let (application, number, raised) = disturbed(cycles, u64::MAX, &mut Vec::new());
+        let dropped = application.engine().events_dropped();
+        let ended = application.deactivate(LastOutputs::Zero, Duration::from_secs(1));
+        let mut main_device = ended.unwrap_or_else(|refused| panic!("{}", refused.error));
+        let since = main_device.engine_mut().events_since(number);
+        assert!(since.next - number >= raised, "{} numbers for {raised} events", since.next - number);
+        // The last cycles, in which no frame is lost, may be one more.
+        let expected = raised.min(QUEUE)..=(raised + 1).min(QUEUE);
+        assert!(expected.contains(&of_domains(&since)), "{} of {raised}", of_domains(&since));
+        assert!(main_device.engine().events_dropped() >= dropped);
+    }
 }

@@ -27,12 +27,11 @@ impl Drop for UnderWay {
 /// write does not concern lasting settings of ports. A measurement that changes ports may begin while the write is
 /// under way: so it counts also where nothing follows the ports yet.
 pub(crate) fn ordering(
-    segment: Option<&SharedSegment>,
+    segment: &SharedSegment,
     station: StationAddress,
     register: RegisterAddress,
     data: &[u8],
 ) -> Option<UnderWay> {
-    let segment = segment?;
     let mut bytes = segment.view().control_of(station).encode();
     let begin = usize::from(register.0);
     let mut is_written = false;

@@ -1,6 +1,7 @@
 //! Why a scan ended without a result.
 
 use core::fmt;
+use core::time::Duration;
 
 use ringcat_wire::address::Position;
 
@@ -29,6 +30,13 @@ pub enum ScanError {
         before: LinkCounts,
         /// At the end.
         after: LinkCounts,
+    },
+    /// What another process knew of the segment was compared with it, and differed again after each scan.
+    Unstable {
+        /// Number of scans.
+        scans: u32,
+        /// Time since the beginning.
+        within: Duration,
     },
     /// Frames with as many datagrams as fit return unprocessed.
     FrameLimit(FrameLimit),
@@ -66,6 +74,13 @@ impl fmt::Display for ScanError {
                  {} and {}",
                 before.main, before.redundant, after.main, after.redundant
             ),
+            ScanError::Unstable { scans, within } => {
+                let within = within.as_millis();
+                write!(
+                    f,
+                    "the segment differs again after each of {scans} scans within {within} ms: a cable may flicker"
+                )
+            }
             ScanError::FrameLimit(limit) => limit.fmt(f),
             ScanError::TooMany { count } => write!(f, "{count} SubDevices, at most {MAX_SUBDEVICES} are possible"),
             ScanError::Bus(error) => error.fmt(f),
@@ -100,6 +115,7 @@ impl ScanError {
             ScanError::NoSubDevices
             | ScanError::NoAnswer
             | ScanError::Unsettled { .. }
+            | ScanError::Unstable { .. }
             | ScanError::FrameLimit(_)
             | ScanError::TooMany { .. }
             | ScanError::RoleChanged => false,

@@ -27,7 +27,7 @@ pub async fn read(bus: &Bus, station: StationAddress, port: u8) -> Result<LoopCo
 /// Opens or closes a port. SubDevices behind a closed port are out of reach.
 pub async fn set(
     bus: &Bus,
-    segment: Option<&SharedSegment>,
+    segment: &SharedSegment,
     station: StationAddress,
     port: u8,
     control: LoopControl,
@@ -100,7 +100,7 @@ async fn set_all(
         }
         writes.push((station, loops));
     }
-    let order = |(station, loops): &(StationAddress, u8)| ordering(Some(segment), *station, LOOPS, &[*loops]);
+    let order = |(station, loops): &(StationAddress, u8)| ordering(segment, *station, LOOPS, &[*loops]);
     let _orders: Vec<_> = writes.iter().map(order).collect();
     let write = |bus: Bus, (station, loops)| async move { bus.fpwr(station, LOOPS, &[loops]).await };
     for written in bus.gather(writes, write).await {

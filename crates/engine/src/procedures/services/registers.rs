@@ -44,7 +44,7 @@ pub async fn read(
 /// register may be written twice.
 pub async fn write(
     bus: &Bus,
-    segment: Option<&SharedSegment>,
+    segment: &SharedSegment,
     station: StationAddress,
     address: RegisterAddress,
     data: &[u8],

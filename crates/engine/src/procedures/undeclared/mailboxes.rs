@@ -7,7 +7,6 @@ use core::cell::RefCell;
 
 use ringcat_wire::address::Position;
 
-use crate::declared::Address;
 use crate::knowledge::KnownMailbox;
 use crate::mail::{EmergencyRings, Mailbox};
 use crate::procedures::configure::ConfigureError;
@@ -45,15 +44,23 @@ impl UndeclaredMailboxes {
     }
 
     /// The SubDevices with mailboxes from now on. Mailboxes of those that stay do not change, the others are closed:
-    /// the result has those with downloads to PDO assignment or mapping that were not fetched.
+    /// the result has those with downloads to PDO assignment or mapping that were not fetched. Emergencies follow a
+    /// SubDevice to its new position; those of one that has left go on with the next one at its position, as after a
+    /// loss of power.
     pub(crate) fn follow(&self, now: &[(SubDeviceKey, Position)]) -> Vec<SubDeviceKey> {
         let (mut all, mut rings) = (self.all.borrow_mut(), self.rings.borrow_mut());
         let is_same =
             |(entry, (key, at)): &(&Entry, &(SubDeviceKey, Position))| entry.key == *key && entry.position == *at;
         let unchanged = all.iter().zip(now).take_while(is_same).count();
         let mut before = all.split_off(unchanged);
-        before.iter().for_each(|entry| rings.forget(entry.position.into()));
-        for (key, position) in now.iter().skip(unchanged) {
+        let now = now.get(unchanged..).unwrap_or_default();
+        for entry in &before {
+            match now.iter().any(|(key, _)| *key == entry.key) {
+                true => rings.forget(entry.position.into()),
+                false => rings.leave(entry.position, entry.mailbox.emergencies()),
+            }
+        }
+        for (key, position) in now {
             let entry = match before.iter().position(|entry| entry.key == *key) {
                 Some(at) => {
                     let entry = before.swap_remove(at);
@@ -63,12 +70,13 @@ impl UndeclaredMailboxes {
                 }
                 None => {
                     let mailbox = Mailbox::new(&self.bus, *position);
-                    mailbox.keep_emergencies_in(rings.of(Address::Scanned(*position)));
+                    mailbox.keep_emergencies_in(rings.arrive(*position));
                     Entry { key: *key, position: *position, mailbox, ended: None }
                 }
             };
             all.push(entry);
         }
+        rings.end_changes();
         before.iter().for_each(|entry| entry.mailbox.close());
         before.iter().filter(|entry| entry.mailbox.has_written_pdos()).map(|entry| entry.key).collect()
     }
@@ -104,7 +112,7 @@ impl UndeclaredMailboxes {
     }
 
     /// The result of an attempt, if it is the last one that has ended.
-    pub(super) fn result(&self, key: SubDeviceKey, attempt: u32) -> Option<AttemptResult> {
+    pub(in crate::procedures) fn result(&self, key: SubDeviceKey, attempt: u32) -> Option<AttemptResult> {
         let all = self.all.borrow();
         let (ended, result) = all.iter().find(|entry| entry.key == key)?.ended.as_ref()?;
         (*ended == attempt).then(|| result.clone())

@@ -35,6 +35,12 @@ impl Segment {
         self.altered.iter().map(restored).collect()
     }
 
+    /// The known port controls when all procedures have ended.
+    pub(in crate::segment) fn lasting_controls(&mut self) -> Vec<PortControl> {
+        let controls = core::mem::take(&mut self.port_controls).into_iter();
+        controls.map(|entry| PortControl { under_way: 0, ..entry }).collect()
+    }
+
     /// Commands to a SubDevice are stored from now on.
     pub(in crate::segment) fn follow_ports(&mut self, station: StationAddress) {
         self.entry(station);

@@ -29,6 +29,9 @@ impl Segment {
         if !self.is_active() {
             self.addresses.change();
             self.subdevices = SubDevices::default();
+            // It opens all ports.
+            self.blocked.clear();
+            self.port_controls.clear();
             self.stage = Stage::Scanning { is_requested };
             self.idle.compared = Comparison::Open;
             self.words.scan.begin(None);
@@ -143,7 +146,8 @@ impl Segment {
         self.link_control.restore(effects);
     }
 
-    /// Begins a stage. Nothing of the last declaration remains; findings that were requested before are refused.
+    /// Begins a stage. Nothing of the last declaration remains; findings that were requested before are refused. Ports
+    /// that were closed by order stay closed, and are known.
     fn begin(&mut self, stage: Stage, mut declared: Declared) {
         declared.cabling.version = self.cabling.version.wrapping_add(1);
         declared.clocks.changes = self.clocks.changes.of_next();
@@ -164,11 +168,15 @@ impl Segment {
         let (choices, frames_tested_until) = (self.choices, self.frames_tested_until);
         // The procedures that would restore them have ended.
         let altered = self.altered();
+        let blocked = core::mem::take(&mut self.blocked);
+        let port_controls = self.lasting_controls();
         let (idle, observed, link_control) = (self.idle.renewed(), self.observed, self.link_control);
         *self = Segment {
             stage,
             observed,
             altered,
+            blocked,
+            port_controls,
             addresses,
             keeping,
             slot,

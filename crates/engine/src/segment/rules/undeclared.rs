@@ -57,6 +57,11 @@ impl Segment {
         self.upkeeps().all(|(_, it)| it.is_settled())
     }
 
+    /// Whether no attempt is under way or falls due by itself: each is settled, or waits for a request.
+    pub fn are_attempts_ended(&self) -> bool {
+        self.upkeeps().all(|(_, it)| it.is_settled() || it.progress == UpkeepProgress::Due(Instant::NEVER))
+    }
+
     /// The OR of their AL states, if each is in its requested state; `None` if some are left in any state.
     pub fn expected_states(&self) -> Option<u8> {
         let is_left = self.upkeeps().any(|(_, it)| it.progress == UpkeepProgress::Left);
@@ -78,9 +83,9 @@ impl Segment {
         self.upkeeps().skip(first).map(|(key, it)| (key, it.reached()))
     }
 
-    /// Station addresses of the others.
-    pub fn unsettled(&self) -> Vec<StationAddress> {
-        self.upkeeps().filter(|(_, it)| !it.is_settled()).map(|(key, _)| key.station).collect()
+    /// The others, with the numbers of their last attempts.
+    pub fn unsettled(&self) -> Vec<(SubDeviceKey, u32)> {
+        self.upkeeps().filter(|(_, it)| !it.is_settled()).map(|(key, it)| (key, it.attempt)).collect()
     }
 
     /// When the next attempt is due.

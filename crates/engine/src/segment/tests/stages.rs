@@ -1,5 +1,7 @@
 //! The stages of the segment: scans, activation and deactivation.
 
+use ringcat_wire::register::{DlControl, LoopControl};
+
 use crate::layout::Layout;
 
 use super::*;
@@ -154,4 +156,28 @@ fn the_list_holds_what_was_found_before_during_and_after_an_application() {
     assert_eq!((segment.subdevices().member_count(), stations(&segment).len()), (0, 3));
     segment.observe(Observation::ScanBegun, Instant(0));
     assert_eq!(stations(&segment), []);
+}
+
+#[test]
+fn ports_closed_by_order_are_known_after_the_application_until_a_scan_opens_them() {
+    let mut segment = scanned(3);
+    let declared = declare(&segment);
+    segment.observe(Observation::Activated(declared), Instant(0));
+    let ports = [BlockedPort { station: station(1), port: 1 }];
+    segment.observe(Observation::Blocked(&ports), Instant(0));
+    let closed = DlControl { loops: [LoopControl::Closed; 4], ..DlControl::default() };
+    segment.observe(Observation::PortsOrdered { station: station(2), control: closed }, Instant(0));
+    for is_next in [false, true] {
+        segment.observe(Observation::Deactivated, Instant(0));
+        if is_next {
+            let declared = declare(&segment);
+            segment.observe(Observation::Activated(declared), Instant(0));
+        }
+        assert_eq!((segment.blocked(), segment.control_of(station(2))), (&ports[..], closed));
+        // The procedure that was sending the order has ended.
+        assert_eq!(segment.port_control(station(2)).map(|it| it.under_way), Some(0));
+    }
+    segment.observe(Observation::Deactivated, Instant(0));
+    segment.observe(Observation::ScanBegun, Instant(0));
+    assert_eq!((segment.blocked(), segment.port_control(station(2)).is_some()), (&[][..], false));
 }

@@ -1,9 +1,11 @@
 //! The segment changes between the last frame of the former owner and the first one of the next.
 
 use super::*;
+use ringcat::{Instant, Link, Links, PerLink};
 use ringcat_sim::cable::CableId;
 use ringcat_sim::fault::Fault;
 use ringcat_wire::al::AlControl;
+use ringcat_wire::frame::MacAddress;
 use scenarios::segments::describe;
 
 /// Applies faults, with a pause after each, while the segment has no owner.
@@ -184,5 +186,67 @@ fn other_controllers_at_known_station_addresses_are_not_taken_for_the_known_ones
         let identities = |all: &[ringcat::SubDeviceInfo]| all.iter().map(|info| info.identity).collect::<Vec<_>>();
         assert_eq!(identities(&main_device.subdevices()), identities(&own));
         exchange_sdos(&mut main_device);
+    }
+}
+
+/// A segment of which the last cable is cut or healed before each round of reads that compares it with what is known.
+struct Flickering {
+    tap: Tap,
+    is_cut: bool,
+    /// The second round finds what the first one has found: only then a crashed owner's ports are not its cause.
+    is_twice: bool,
+}
+
+impl Links for Flickering {
+    fn now(&self) -> Instant {
+        self.tap.now()
+    }
+
+    fn addresses(&self) -> PerLink<MacAddress> {
+        self.tap.addresses()
+    }
+
+    fn send(&mut self, link: Link, frame: &[u8]) {
+        // APRD of the first 20 registers.
+        let is_compared = |at: &[u8]| at[0] == 1 && at[4..8] == [0, 0, 20, 0x80];
+        if link == Link::Main && frame[16..].windows(8).any(is_compared) {
+            let last = CableId(self.tap.network().cables().len() - 1);
+            self.is_cut = !self.is_cut || std::mem::take(&mut self.is_twice);
+            let fault = if self.is_cut { Fault::Cut(last) } else { Fault::Heal(last) };
+            self.tap.network_mut().apply(fault);
+        }
+        self.tap.send(link, frame);
+    }
+
+    fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool {
+        self.tap.receive(take)
+    }
+
+    fn carrier(&self, link: Link) -> Option<bool> {
+        self.tap.carrier(link)
+    }
+
+    fn wait(&mut self, until: Instant) {
+        self.tap.wait(until);
+    }
+}
+
+// covers: states
+#[test]
+fn a_segment_that_changes_after_each_scan_is_given_up_with_a_reason() {
+    for handover in HANDOVERS {
+        let instantly = NetworkOptions::default().with_detection_delay(Duration::ZERO);
+        let former = idle(line(descriptions(&["servo", "digital-input-8"]), instantly));
+        let bytes = to_bytes(&former);
+        let mut tap = former.into_links();
+        let begun = tap.now();
+        tap.set_limit(begun + Duration::from_secs(10));
+        let links = Flickering { tap, is_cut: false, is_twice: handover == Handover::AfterCrash };
+        let mut main_device = MainDevice::request(links, &options());
+        let knowledge = Knowledge::from_bytes(&bytes).expect("they were written");
+        let error = main_device.resume(knowledge, handover).expect_err("it does not become stable");
+        let (took, text) = (main_device.now().since(begun), error.to_string());
+        assert!(took <= Duration::from_secs(6), "{took:?}: {text}");
+        assert!(text.contains("differs again after each of"), "{text}");
     }
 }
