@@ -268,7 +268,8 @@ impl Supervisor {
         self.shared.borrow().events.since(number)
     }
 
-    /// Number of events that were dropped because the application did not fetch them, or lost before they were numbered.
+    /// Number of events that were dropped because the application did not fetch them, or lost before they had
+    /// numbers.
     pub fn events_dropped(&self) -> u64 {
         self.shared.borrow().events.dropped()
     }

@@ -219,8 +219,8 @@ impl EventLog {
         EventsSince { epoch: self.epoch, events, missed, next: self.next }
     }
 
-    /// Number of events that were dropped because the application did not fetch them, and of those that were lost before
-    /// they reached the log.
+    /// Number of events that were dropped because the application did not fetch them, and of those that were lost
+    /// before they reached the log.
     pub fn dropped(&self) -> u64 {
         self.dropped
     }
