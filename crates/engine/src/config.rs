@@ -34,7 +34,7 @@ use crate::info::{Direction, SubDeviceInfo};
 
 pub use crate::info::IdentityField;
 
-pub use address::ConfigAddress;
+pub use address::{ConfigAddress, data_words};
 pub use declared::{DeclaredArea, DeclaredSyncManager, SyncManagerRole};
 #[cfg(feature = "standby")]
 pub use digest::{ConfigPart, Digest};

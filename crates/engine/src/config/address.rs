@@ -1,8 +1,13 @@
 //! Expected place of a SubDevice.
 
+use alloc::vec::Vec;
 use core::fmt;
 
+use ringcat_wire::address::RegisterAddress;
+
+use super::SubDeviceConfig;
 use crate::info::SubDeviceInfo;
+use crate::order::InOrder;
 
 /// Expected place of a SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -26,22 +31,54 @@ pub enum ConfigAddress {
         /// Number of SubDevices behind it.
         offset: u16,
     },
+    /// `offset` SubDevices behind the one with this value in a word of its memory, which the SII need not name
+    /// (protocol 4.3). [`MainDevice::start_connection_check`](crate::main_device::MainDevice::start_connection_check)
+    /// reads the word.
+    DataWord {
+        /// Physical address of the word.
+        register: RegisterAddress,
+        /// Its value.
+        value: u16,
+        /// Number of SubDevices behind it.
+        offset: u16,
+    },
+}
+
+/// The data words that declarations name, each once.
+pub fn data_words<'a>(configs: impl IntoIterator<Item = &'a SubDeviceConfig>) -> Vec<RegisterAddress> {
+    let mut words: Vec<RegisterAddress> = configs.into_iter().filter_map(|it| it.address.data_word()).collect();
+    words.put_in_order();
+    words.dedup();
+    words
 }
 
 impl ConfigAddress {
     /// Number of SubDevices behind the one with the alias or identification.
     pub(super) fn offset(self) -> usize {
         match self {
-            ConfigAddress::Alias { offset, .. } | ConfigAddress::Identification { offset, .. } => offset.into(),
+            ConfigAddress::Alias { offset, .. }
+            | ConfigAddress::Identification { offset, .. }
+            | ConfigAddress::DataWord { offset, .. } => offset.into(),
             ConfigAddress::Position(_) => 0,
         }
     }
 
+    /// Address of the data word from which the address counts.
+    pub const fn data_word(self) -> Option<RegisterAddress> {
+        match self {
+            ConfigAddress::DataWord { register, .. } => Some(register),
+            ConfigAddress::Position(_) | ConfigAddress::Alias { .. } | ConfigAddress::Identification { .. } => None,
+        }
+    }
+
     /// The address this number of places further behind.
-    pub(super) fn behind(self, places: u16) -> ConfigAddress {
+    pub fn behind(self, places: u16) -> ConfigAddress {
         match self {
             ConfigAddress::Alias { alias, .. } => ConfigAddress::Alias { alias, offset: places },
             ConfigAddress::Identification { value, .. } => ConfigAddress::Identification { value, offset: places },
+            ConfigAddress::DataWord { register, value, .. } => {
+                ConfigAddress::DataWord { register, value, offset: places }
+            }
             ConfigAddress::Position(position) => ConfigAddress::Position(position.saturating_add(places)),
         }
     }
@@ -51,6 +88,7 @@ impl ConfigAddress {
         match self {
             ConfigAddress::Alias { alias, .. } => alias != 0 && alias == info.alias,
             ConfigAddress::Identification { value, .. } => info.identification == Some(value),
+            ConfigAddress::DataWord { register, value, .. } => info.data_word(register) == Some(value),
             ConfigAddress::Position(_) => false,
         }
     }
@@ -63,6 +101,9 @@ impl ConfigAddress {
                 match self.0 {
                     ConfigAddress::Alias { alias, .. } => write!(f, "alias {alias}"),
                     ConfigAddress::Identification { value, .. } => write!(f, "identification {value}"),
+                    ConfigAddress::DataWord { register, value, .. } => {
+                        write!(f, "data word {value} at {register}")
+                    }
                     ConfigAddress::Position(position) => write!(f, "position {position}"),
                 }
             }
@@ -75,7 +116,9 @@ impl fmt::Display for ConfigAddress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             ConfigAddress::Position(_) => self.mark().fmt(f),
-            ConfigAddress::Alias { offset, .. } | ConfigAddress::Identification { offset, .. } => {
+            ConfigAddress::Alias { offset, .. }
+            | ConfigAddress::Identification { offset, .. }
+            | ConfigAddress::DataWord { offset, .. } => {
                 write!(f, "{} offset {offset}", self.mark())
             }
         }

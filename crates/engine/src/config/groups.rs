@@ -1,6 +1,6 @@
 //! Hot connect groups: consecutive SubDevices that may be present or absent, at any place of the segment.
 //!
-//! The first one, the head, is found by alias or explicit device identification; the others follow it in the order of
+//! The first one, the head, is found by alias, explicit device identification or data word; the others follow it in the order of
 //! the processing units. This module matches what the scan found; the procedures match groups that join later.
 
 use alloc::collections::BTreeMap;
@@ -21,7 +21,7 @@ pub struct Group {
 
 impl Group {
     /// A group of one: its head, declared [at an alias](SubDeviceConfig::at_alias) with offset 0 or [with an
-    /// identification](SubDeviceConfig::at_identification).
+    /// identification](SubDeviceConfig::at_identification) or [a data word](SubDeviceConfig::at_data_word).
     pub fn new(head: SubDeviceConfig) -> Group {
         Group { members: Vec::from([head]) }
     }
@@ -79,7 +79,10 @@ pub(super) fn find(
 pub(crate) fn can_be_head(config: &SubDeviceConfig) -> bool {
     match config.address {
         ConfigAddress::Alias { alias, offset: 0 } => alias != 0,
-        ConfigAddress::Identification { offset: 0, .. } => true,
-        ConfigAddress::Alias { .. } | ConfigAddress::Identification { .. } | ConfigAddress::Position(_) => false,
+        ConfigAddress::Identification { offset: 0, .. } | ConfigAddress::DataWord { offset: 0, .. } => true,
+        ConfigAddress::Alias { .. }
+        | ConfigAddress::Identification { .. }
+        | ConfigAddress::DataWord { .. }
+        | ConfigAddress::Position(_) => false,
     }
 }

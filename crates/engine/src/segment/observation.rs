@@ -34,7 +34,7 @@ use super::words::Words;
 #[cfg(feature = "standby")]
 use crate::board::live::Life;
 use crate::declared::Move;
-use crate::info::SubDeviceInfo;
+use crate::info::{DataWord, SubDeviceInfo};
 use crate::ring::FrameLimit;
 use crate::ring_status::CableErrors;
 use crate::topology::NodeStatus;
@@ -187,6 +187,14 @@ pub enum Observation<'a> {
         key: SubDeviceKey,
         /// Its data.
         read: &'a SubDeviceInfo,
+    },
+    /// Words of the memory of a scanned SubDevice by which declarations may find it. They are refused if another
+    /// SubDevice has got the address since.
+    DataWords {
+        /// The SubDevice at the request.
+        key: SubDeviceKey,
+        /// The words that it has.
+        words: Vec<DataWord>,
     },
     /// A finding of the comparison of a declaration with the scan. There is no wait between both and this.
     Compared(DeclarationFinding),

@@ -2,9 +2,10 @@
 
 use alloc::rc::Rc;
 use alloc::string::{String, ToString};
+use alloc::vec::Vec;
 
 use crate::event::Event;
-use crate::info::SubDeviceInfo;
+use crate::info::{DataWord, SubDeviceInfo};
 use crate::segment::effect::{Effect, Effects, Task, Watch};
 use crate::segment::idle::{Comparison, Work};
 use crate::segment::key::SubDeviceKey;
@@ -86,6 +87,21 @@ impl Segment {
         }
         let before = core::mem::replace(known, Rc::new(info));
         self.subdevices.replace(&before, known);
+    }
+
+    /// Words by which declarations may find a scanned SubDevice were read.
+    pub(in crate::segment) fn observe_data_words(&mut self, key: SubDeviceKey, words: Vec<DataWord>) {
+        if self.subdevices.at(key.station).is_none_or(|it| it.key != key) {
+            return;
+        }
+        let Some(scanned) = self.stage.scanned_mut() else { return };
+        let found = Rc::make_mut(&mut scanned.found);
+        let Some(known) = found.subdevices.iter_mut().find(|info| info.station == key.station) else { return };
+        if known.data_words != words {
+            let info = SubDeviceInfo { data_words: words, ..(**known).clone() };
+            let before = core::mem::replace(known, Rc::new(info));
+            self.subdevices.replace(&before, known);
+        }
     }
 
     /// Single SubDevices are configured before an application is active.
