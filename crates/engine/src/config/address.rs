@@ -1,13 +1,10 @@
 //! Expected place of a SubDevice.
 
-use alloc::vec::Vec;
 use core::fmt;
 
 use ringcat_wire::address::RegisterAddress;
 
-use super::SubDeviceConfig;
 use crate::info::SubDeviceInfo;
-use crate::order::InOrder;
 
 /// Expected place of a SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -32,8 +29,7 @@ pub enum ConfigAddress {
         offset: u16,
     },
     /// `offset` SubDevices behind the one with this value in a word of its memory, which the SII need not name
-    /// (protocol 4.3). [`MainDevice::start_connection_check`](crate::main_device::MainDevice::start_connection_check)
-    /// reads the word.
+    /// (protocol 4.3). The word is read between the scan and the activation (`MainDevice::start_connection_check`).
     DataWord {
         /// Physical address of the word.
         register: RegisterAddress,
@@ -42,14 +38,6 @@ pub enum ConfigAddress {
         /// Number of SubDevices behind it.
         offset: u16,
     },
-}
-
-/// The data words that declarations name, each once.
-pub fn data_words<'a>(configs: impl IntoIterator<Item = &'a SubDeviceConfig>) -> Vec<RegisterAddress> {
-    let mut words: Vec<RegisterAddress> = configs.into_iter().filter_map(|it| it.address.data_word()).collect();
-    words.put_in_order();
-    words.dedup();
-    words
 }
 
 impl ConfigAddress {

@@ -1,16 +1,19 @@
 //! Hot connect groups: consecutive SubDevices that may be present or absent, at any place of the segment.
 //!
-//! The first one, the head, is found by alias, explicit device identification or data word; the others follow it in the order of
-//! the processing units. This module matches what the scan found; the procedures match groups that join later.
+//! The first one, the head, is found by alias, explicit device identification or data word; the others follow it in the
+//! order of the processing units. This module matches what the scan found; the procedures match groups that join later.
 
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
+
+use ringcat_wire::address::RegisterAddress;
 
 use super::matching::{Marked, at_place, missing};
 use super::resolution::Resolution;
 use super::{ConfigAddress, SubDeviceConfig};
 use crate::declared::GroupId;
 use crate::info::SubDeviceInfo;
+use crate::order::InOrder;
 
 /// A hot connect group.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -73,6 +76,14 @@ pub(super) fn find(
         intact &= matches!(resolution, Resolution::Found { .. });
         resolutions[*config] = Some(resolution);
     }
+}
+
+/// The data words that declarations name, each once.
+pub fn data_words<'a>(configs: impl IntoIterator<Item = &'a SubDeviceConfig>) -> Vec<RegisterAddress> {
+    let mut words: Vec<RegisterAddress> = configs.into_iter().filter_map(|it| it.address.data_word()).collect();
+    words.put_in_order();
+    words.dedup();
+    words
 }
 
 /// Whether a declaration can be the head of a group.

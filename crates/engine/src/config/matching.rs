@@ -63,7 +63,7 @@ impl Marked {
         Marked { aliases, identifications, data_words }
     }
 
-    /// The only SubDevice with the alias, identification or data word of an address; the first of the segment for alias 0.
+    /// The only SubDevice with the alias, identification or data word of an address; the first one for alias 0.
     pub(super) fn find(&self, address: ConfigAddress, infos: &[&SubDeviceInfo]) -> Result<Option<usize>, ConfigError> {
         let (marks, mark) = match address {
             ConfigAddress::Alias { alias: 0, .. } => return Ok((!infos.is_empty()).then_some(0)),

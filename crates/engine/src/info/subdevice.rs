@@ -126,8 +126,7 @@ pub struct SubDeviceInfo {
     pub identity: Identity,
     /// Explicit device identification, as set at its switches; `None` if it has none (protocol 5.3, 4.3).
     pub identification: Option<u16>,
-    /// The words of its memory that a declaration names ([`ConfigAddress::DataWord`](crate::config::ConfigAddress)) and
-    /// that it has, as read last.
+    /// The words of its memory by which a declaration finds SubDevices and that it has, as read last.
     pub data_words: Vec<DataWord>,
     /// The controller.
     pub controller: ControllerInfo,

@@ -8,7 +8,7 @@ use ringcat_wire::address::{RegisterAddress, StationAddress};
 use super::shared_segment::SharedSegment;
 use crate::config::data_words;
 use crate::info::{DataWord, SubDeviceInfo};
-use crate::segment::Observation;
+use crate::segment::{More, Observation};
 use crate::supervisor::{Bus, BusError};
 
 /// Reads of a word that no SubDevice answers: a frame may be lost, or the memory does not exist.
@@ -31,7 +31,7 @@ pub(crate) async fn read_of_scan(bus: &Bus, segment: &SharedSegment, words: &[Re
         async move { (key, read(&bus, key.station, &words).await) }
     });
     for (key, words) in read.await {
-        segment.observe(Observation::DataWords { key, words: words.unwrap_or_default() });
+        segment.observe(Observation::MoreRead { key, more: More::DataWords(words.unwrap_or_default()) });
     }
     found()
 }
