@@ -5,6 +5,7 @@ mod cables;
 mod commands;
 mod exported;
 mod numbers;
+mod on_wire;
 mod variants;
 
 use std::path::{Path, PathBuf};
