@@ -127,7 +127,10 @@ fn scan<L: Links>(
             on_event(event);
         }
     });
-    let scan = scan.inspect_err(|_| oddities.print(&[]))?;
+    let mut scan = scan.inspect_err(|_| oddities.print(&[]))?;
+    if let Some(declared) = declared {
+        main_device.read_data_words(&declared.declaration.subdevices, &mut scan);
+    }
     let not_closed = declared.and_then(|declared| not_closed(&mut main_device, declared));
     let (mut firmware, mut modules, mut lists, mut unlisted) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (info, wanted) in scan.subdevices.iter().zip(wanted(&scan.subdevices)) {

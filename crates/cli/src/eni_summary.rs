@@ -181,6 +181,7 @@ fn place(address: ConfigAddress) -> String {
         ConfigAddress::Position(position) => format!("position {position}"),
         ConfigAddress::Alias { alias, offset } => format!("alias {alias} + {offset}"),
         ConfigAddress::Identification { value, offset } => format!("id {value} + {offset}"),
+        ConfigAddress::DataWord { register, value, offset } => format!("word {value} at {register} + {offset}"),
         other => other.to_string(),
     }
 }

@@ -72,6 +72,7 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
         Some(scan) => scan,
         None => scan(&supervisor, &mut cyclic, &mut surroundings, begin)?,
     };
+    network.iter().try_for_each(|network| supervisor.read_data_words(network.declared(), &mut scan))?;
     let described = complete_by(&supervisor, descriptions.as_mut(), &mut scan.subdevices)?;
     let (names, objects) = names(network.as_ref(), &scan, described);
     let declaration = arguments.declared.declare(network.as_ref(), &scan.subdevices)?;

@@ -39,7 +39,7 @@ pub use declared::{DeclaredArea, DeclaredSyncManager, SyncManagerRole};
 #[cfg(feature = "standby")]
 pub use digest::{ConfigPart, Digest};
 pub(crate) use groups::can_be_head;
-pub use groups::{Group, groups};
+pub use groups::{Group, data_words, groups};
 pub use ip::IpSettings;
 pub use pdo::{PdoAssignment, PdoEntry, PdoMapping};
 pub use refused_pdos::RefusedPdos;

@@ -27,7 +27,7 @@ pub use extent::SiiExtent;
 pub use identity_field::IdentityField;
 pub use object::{Entry, Object};
 pub use pdo_source::PdoSource;
-pub use subdevice::{ControllerInfo, MailboxSyncManagers, PdoEntryInfo, PdoInfo, Readout, SubDeviceInfo};
+pub use subdevice::{ControllerInfo, DataWord, MailboxSyncManagers, PdoEntryInfo, PdoInfo, Readout, SubDeviceInfo};
 pub use warning::{InfoWarning, SiiProblem};
 
 impl SubDeviceInfo {

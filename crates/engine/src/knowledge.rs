@@ -29,7 +29,7 @@ pub use error::KnowledgeError;
 /// First bytes.
 const MAGIC: [u8; 8] = *b"RingCAT\0";
 /// Version of the form of the bytes. Bytes of other versions are refused: the reader scans.
-const VERSION: u16 = 4;
+const VERSION: u16 = 5;
 /// Bytes of magic, version, length and checksum.
 const HEADER: usize = 8 + 2 + 4 + 8;
 /// Bytes of a SubDevice, as a first estimate.

@@ -66,7 +66,10 @@ fn plan_inner(config: &SubDeviceConfig, info: &SubDeviceInfo) -> Result<SubDevic
             if mailbox.is_empty() {
                 mailbox = mailbox_beside(info, declared, &process_data).unwrap_or_default();
                 warnings.extend((!mailbox.is_empty()).then_some(PlanWarning::MailboxOfSii));
+            } else {
+                warnings.extend(other_mailboxes(info, &mailbox));
             }
+            warnings.extend(process_data.iter().filter_map(|area| other_address(info, area)));
             (mailbox, process_data, Vec::new())
         }
         None => {
@@ -137,6 +140,25 @@ fn mailbox_beside(
     let mailbox = mailbox_of_sii(info)?;
     let is_used = mailbox.iter().any(|sm| declared.iter().any(|it| it.index == sm.index));
     (!is_used && check::check(info, &mailbox, process_data).is_ok()).then_some(mailbox)
+}
+
+/// The mailboxes of a file that differ from those of the SII.
+fn other_mailboxes(info: &SubDeviceInfo, mailbox: &[SmPlan]) -> impl Iterator<Item = PlanWarning> {
+    let of_sii = mailbox_of_sii(info).unwrap_or_default();
+    mailbox.iter().filter_map(move |own| {
+        let other = of_sii.iter().find(|other| other.index == own.index)?;
+        let [declared, sii] = [own, other].map(|it| (it.register.start, it.register.length));
+        (declared != sii).then_some(PlanWarning::OtherMailbox { sync_manager: own.index, declared, sii })
+    })
+}
+
+/// Process data of a file at another address than that of the SII.
+fn other_address(info: &SubDeviceInfo, area: &AreaPlan) -> Option<PlanWarning> {
+    let sync_manager = area.sync_manager;
+    let described = info.sync_managers.get(usize::from(sync_manager))?;
+    let is_process_data = matches!(described.kind, SyncManagerKind::Outputs | SyncManagerKind::Inputs);
+    let (declared, sii) = (area.physical, described.start);
+    (is_process_data && declared != sii).then_some(PlanWarning::OtherAddress { sync_manager, declared, sii })
 }
 
 fn mailbox_pair(info: &SubDeviceInfo, layout: &MailboxLayout, of: MailboxSyncManagers) -> Vec<SmPlan> {

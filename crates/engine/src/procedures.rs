@@ -10,6 +10,7 @@ pub mod clocks;
 pub(crate) mod command_watch;
 pub(crate) mod complete_siis;
 pub mod configure;
+pub(crate) mod data_words;
 pub(crate) mod deactivate;
 pub(crate) mod dictionary;
 pub(crate) mod error_statistics;

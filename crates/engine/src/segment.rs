@@ -72,7 +72,7 @@ pub use local_rings::is_down;
 pub use model::{Declared, Segment};
 #[cfg(feature = "standby")]
 pub use observation::StandbyObservation;
-pub use observation::{MemberFinding, Observation, Problem, ProcessDataStep};
+pub use observation::{MemberFinding, More, Observation, Problem, ProcessDataStep};
 pub use owners::Owners;
 pub use pdo_finding::PdoFinding;
 pub use port_control::BlockedPort;

@@ -1,7 +1,8 @@
 /*
- * ringcat.h: what RingCAT adds to ecrt.h. Networks from a network file (docs/network-file.md of RingCAT).
+ * ringcat.h: what RingCAT adds to ecrt.h. Networks from a network file (docs/network-file.md of RingCAT) or from an ENI
+ * of a configuration tool (docs/eni.md).
  *
- * A program that loads a network file declares nothing itself: SubDevices with their PDOs, start-up commands and SYNC
+ * A program that loads one of them declares nothing itself: SubDevices with their PDOs, start-up commands and SYNC
  * signals, and the domains, are those of the file. The other functions of ecrt.h work as ever: requests and mailbox
  * services with the SubDevices, queue, process, state and data with the domains, clocks and the cycle with the master.
  * The library is libethercat of RingCAT; libfakeethercat does not have these functions.
@@ -35,6 +36,20 @@ typedef struct {
  * -EBUSY. SubDevices and domains of its own can be added.
  */
 EC_PUBLIC_API int ringcat_master_load_network(ec_master_t *master, const char *path);
+
+/* The same with the contents of a network file in memory, of `size` bytes; it is read once. -EFAULT: data is NULL. */
+EC_PUBLIC_API int ringcat_master_load_network_data(ec_master_t *master, const void *data, size_t size);
+
+/*
+ * Declares the network of an ENI. Returns as ringcat_master_load_network().
+ *
+ * Its domains have their numbers as names, from "0", in the order of the cyclic frames of the file; variables have the
+ * names of the file. Copies from inputs to outputs (`CopyInfos`) are the program's own.
+ */
+EC_PUBLIC_API int ringcat_master_load_eni(ec_master_t *master, const char *path);
+
+/* The same with the contents of an ENI in memory, of `size` bytes; it is read once. -EFAULT: data is NULL. */
+EC_PUBLIC_API int ringcat_master_load_eni_data(ec_master_t *master, const void *data, size_t size);
 
 /* The SubDevice with a name in the file; NULL if there is none. ecrt_master_slave_config() finds it, too. */
 EC_PUBLIC_API ec_slave_config_t *ringcat_master_subdevice(ec_master_t *master, const char *name);

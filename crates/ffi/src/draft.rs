@@ -3,7 +3,6 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use ringcat::network::LoadedNetwork;
 use ringcat::{
     ClockConfig, Declaration, DomainId, Entry, EntryPlace, PulseGrid, ReferenceClock, RegisterError, Required,
     SubDeviceConfig, SubDeviceId, SubDeviceInfo,
@@ -11,7 +10,7 @@ use ringcat::{
 
 use crate::code::{Code, Outcome, report};
 use crate::domain_words::DomainWords;
-use crate::network::{self, Area, Names};
+use crate::network::{self, Area, Names, Network};
 use crate::settings::{Name, Settings};
 
 /// A declaration under construction.
@@ -84,11 +83,12 @@ impl Draft {
         self.declaration.found(&self.found, SubDeviceId(index))
     }
 
-    /// Declares the network of a file. What it leaves to the EEPROM is that of the SubDevices that were found.
+    /// Declares the network of a network file or an ENI. What it leaves to the EEPROM is that of the SubDevices that
+    /// were found.
     ///
     /// # Errors
     /// SubDevices or domains are declared already; process data of the file does not fit.
-    pub fn load(&mut self, file: &LoadedNetwork) -> Outcome {
+    pub fn load(&mut self, file: &Network) -> Outcome {
         if !(self.settings.is_empty() && self.domains.is_empty()) {
             return Err(Code::BUSY);
         }
@@ -106,8 +106,7 @@ impl Draft {
             }
             self.registered(id);
         }
-        let domains: Vec<String> = file.file.domain.iter().map(|domain| domain.name.clone()).collect();
-        self.names = network::names(&file.configuration, &domains, &areas);
+        self.names = network::names(&file.configuration, &file.domains, &areas);
         Ok(())
     }
 

@@ -8,7 +8,6 @@ use std::sync::{Arc, Mutex, RwLock};
 use std::time::Duration;
 
 use ringcat::daemon::{ClientError, OwnershipWatch};
-use ringcat::network::LoadedNetwork;
 use ringcat::{
     ClockDatagrams, Declaration, DomainId, Instant, LastOutputs, Link, Links, LiveStatus, ReferenceClock, Services,
     SubDeviceId,
@@ -23,6 +22,7 @@ use crate::environment::socket;
 use crate::given_time::{Given, passed_since};
 use crate::host::{check_memory, variable, watch_forks};
 use crate::locks::locked;
+use crate::network::Network;
 use crate::responder::{DaemonResponder, Responder};
 use crate::types::SegmentState;
 
@@ -209,13 +209,13 @@ impl Master {
     ///
     /// # Errors
     /// As [`Master::change`]; something is declared already, or the file does not fit the bus.
-    pub fn load(&self, file: &LoadedNetwork) -> Outcome {
+    pub fn load(&self, file: &Network) -> Outcome {
         if self.is_active() {
             return Err(Code::BUSY);
         }
         self.refresh()?;
         let is_ring = self.responder()?.overview()?.is_ring;
-        if file.file.redundancy.ring && !is_ring {
+        if file.is_ring && !is_ring {
             report(format_args!("the network file declares a ring: it needs a redundant interface"));
             return Err(Code::INVALID);
         }

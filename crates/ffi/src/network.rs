@@ -1,10 +1,12 @@
-//! A network file in place of the calls that declare SubDevices, domains and process data: where its variables are in
-//! the images of the domains, by name.
+//! A network file or an ENI in place of the calls that declare SubDevices, domains and process data: where its
+//! variables are in the images of the domains, by name.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::Path;
 
 use ringcat::config::{Configuration, Variable};
+use ringcat::eni::EniFile;
 use ringcat::network::LoadedNetwork;
 use ringcat::{ConfigAddress, Declaration, Direction, DomainId, SubDeviceConfig, SubDeviceInfo};
 
@@ -48,21 +50,66 @@ pub struct Area {
     pub start: u32,
 }
 
-/// Reads a file.
-///
-/// # Errors
-/// It cannot be read, or its content is wrong; a message to the operator says what is wrong, and in which line.
-pub fn load(path: &str) -> Outcome<LoadedNetwork> {
-    LoadedNetwork::load(Path::new(path)).map_err(|error| {
-        report(format_args!("{error}"));
-        Code::INVALID
-    })
+/// Where the text of a network is.
+#[derive(Clone, Copy, Debug)]
+pub enum Source<'a> {
+    /// In a file.
+    Path(&'a str),
+    /// In memory.
+    Memory(&'a [u8]),
 }
 
-/// The declaration of a file. As those of `ecrt.h`, a SubDevice is used at its exact position only, unless others
+/// A network of a network file or an ENI.
+#[derive(Debug)]
+pub struct Network {
+    /// What is declared.
+    pub configuration: Configuration,
+    /// Names of the domains.
+    pub domains: Vec<String>,
+    /// It needs a redundant interface.
+    pub is_ring: bool,
+}
+
+impl Network {
+    /// Reads a network file.
+    ///
+    /// # Errors
+    /// It cannot be read, or its content is wrong; a message to the operator says what is wrong, and in which line.
+    pub fn of_file(source: Source<'_>) -> Outcome<Network> {
+        let loaded = match source {
+            Source::Path(path) => LoadedNetwork::load(Path::new(path)),
+            Source::Memory(bytes) => LoadedNetwork::from_bytes("network file in memory", bytes),
+        };
+        let LoadedNetwork { file, configuration, .. } = loaded.map_err(refused)?;
+        let domains = file.domain.iter().map(|domain| domain.name.clone()).collect();
+        Ok(Network { configuration, domains, is_ring: file.redundancy.ring })
+    }
+
+    /// Reads an ENI. Its domains have their numbers as names.
+    ///
+    /// # Errors
+    /// As [`Network::of_file`].
+    pub fn of_eni(source: Source<'_>) -> Outcome<Network> {
+        let EniFile { configuration, .. } = match source {
+            Source::Path(path) => EniFile::load(Path::new(path)).map_err(refused)?,
+            Source::Memory(bytes) => {
+                EniFile::from_bytes(bytes).map_err(|error| refused(format_args!("ENI in memory: {error}")))?
+            }
+        };
+        let domains = (0..configuration.declaration.domains.len()).map(|number| number.to_string()).collect();
+        Ok(Network { configuration, domains, is_ring: false })
+    }
+}
+
+fn refused(error: impl Display) -> Code {
+    report(format_args!("{error}"));
+    Code::INVALID
+}
+
+/// The declaration of a network. As those of `ecrt.h`, a SubDevice is used at its exact position only, unless others
 /// before it may be absent.
-pub fn declaration(file: &LoadedNetwork) -> Declaration {
-    let mut declaration = file.declaration();
+pub fn declaration(network: &Network) -> Declaration {
+    let mut declaration = network.configuration.declaration.clone();
     let is_fixed = |config: &SubDeviceConfig| !config.optional && config.group.is_none();
     if declaration.subdevices.iter().all(is_fixed) {
         for config in &mut declaration.subdevices {
@@ -91,6 +138,10 @@ pub fn name(index: usize, config: &SubDeviceConfig) -> Name {
 /// of the SubDevice that was found.
 pub fn sync_managers(config: &SubDeviceConfig, found: Option<&SubDeviceInfo>, wanted: Option<&[u8]>) -> Vec<u8> {
     let numbers: Vec<u8> = match (&config.pdos, found) {
+        _ if config.declared.is_some() => {
+            let declared = config.declared.iter().flatten().filter(|of| of.role.direction().is_some());
+            declared.map(|of| of.index).collect()
+        }
         (Some(declared), _) => declared.iter().filter(|of| !of.pdos.is_empty()).map(|of| of.sync_manager).collect(),
         (None, Some(info)) => {
             let all = 0..u8::try_from(info.sync_managers.len()).unwrap_or(u8::MAX);

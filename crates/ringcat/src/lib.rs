@@ -175,7 +175,7 @@ pub use ringcat_engine::config::{
     IdentityField, IdnRead, IdnWrite, IpSettings, MailMessage, ModeError, Passage, PdoAssignment, PdoEntry, PdoMapping,
     PulseGrid, ReferenceClock, RefusedPdos, RegisterAccess, RegisterCommand, SdoDownload, SdoUpload, StartupAction,
     StartupCommand, StateTimeout, SubDeviceConfig, SyncManagerRole, SyncSignals, Timeouts, Transition, Watchdog,
-    WhenUnlocked,
+    WhenUnlocked, data_words,
 };
 pub use ringcat_engine::domain::{DomainId, DomainState, DomainStatus, Freshness};
 pub use ringcat_engine::event::{
@@ -184,7 +184,7 @@ pub use ringcat_engine::event::{
 };
 pub use ringcat_engine::exchange::{ClockDatagrams, ReferenceTime};
 pub use ringcat_engine::exchange::{CopyError, CopyId, CopyRule, CyclicCounters, Entry, WhenStale};
-pub use ringcat_engine::info::{Direction, SiiExtent, SubDeviceInfo};
+pub use ringcat_engine::info::{DataWord, Direction, SiiExtent, SubDeviceInfo};
 pub use ringcat_engine::knowledge::{Handover, Knowledge, KnowledgeError, KnownMailbox, KnownProgress, KnownSubDevice};
 pub use ringcat_engine::layout::LrwPolicy;
 pub use ringcat_engine::link::Link;

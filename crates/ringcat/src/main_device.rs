@@ -4,7 +4,7 @@ use std::fmt;
 use std::sync::Arc;
 use std::time::Duration;
 
-use ringcat_engine::config::SubDeviceConfig;
+use ringcat_engine::config::{SubDeviceConfig, data_words};
 use ringcat_engine::domain::DomainId;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::info::SubDeviceInfo;
@@ -66,6 +66,15 @@ impl<L: Links> MainDevice<L> {
     pub fn restart_scan(&mut self) -> Result<Scan, Error> {
         self.engine.restart_scan()?;
         self.finish_scan(|_| ())
+    }
+
+    /// Reads the words of memory by which declarations find SubDevices
+    /// ([`ConfigAddress::DataWord`](crate::ConfigAddress)) into the result of a scan. An activation reads them by
+    /// itself; a comparison before it needs them.
+    pub fn read_data_words(&mut self, declared: &[SubDeviceConfig], scan: &mut Scan) {
+        let words = self.engine.start_data_words(data_words(declared));
+        let read = self.finish(words);
+        take_data_words(read, scan);
     }
 
     /// Waits for the end of a scan that the engine has begun.
@@ -304,4 +313,13 @@ pub fn automatic(subdevices: &[SubDeviceInfo], period: Duration) -> Declaration 
         declaration.add(SubDeviceConfig::from_info(subdevice));
     }
     declaration
+}
+
+/// Takes the data words that were read into the result of a scan.
+pub(crate) fn take_data_words(read: Vec<SubDeviceInfo>, scan: &mut Scan) {
+    for (of, read) in scan.subdevices.iter_mut().zip(read) {
+        if of.identity == read.identity {
+            of.data_words = read.data_words;
+        }
+    }
 }

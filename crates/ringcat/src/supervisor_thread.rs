@@ -22,6 +22,7 @@ use std::time::Duration;
 use ringcat_engine::AcyclicCounters;
 use ringcat_engine::JunctionConnection;
 use ringcat_engine::Scan;
+use ringcat_engine::config::{SubDeviceConfig, data_words};
 use ringcat_engine::domain::DomainId;
 use ringcat_engine::event::TimedEvent;
 use ringcat_engine::main_device::{ActivateError, Declaration, MainDevice as Engine, Pending, SubDeviceState};
@@ -35,7 +36,7 @@ use crate::application::Application;
 use crate::error::Error;
 use crate::job::{InOrder, Job, Task, job};
 use crate::links::Links;
-use crate::main_device::{Options, Refused};
+use crate::main_device::{Options, Refused, take_data_words};
 use crate::window::Window;
 use worker::{Attention, Published, Request, Rest, Worker};
 
@@ -233,6 +234,16 @@ impl SupervisorThread {
     pub fn restart_scan(&self) -> Result<Scan, Error> {
         self.act(Engine::restart_scan)??;
         self.finish_scan(|| ())
+    }
+
+    /// As [`crate::MainDevice::read_data_words`].
+    ///
+    /// # Errors
+    /// [`Error::Gone`]: the thread has ended.
+    pub fn read_data_words(&self, declared: &[SubDeviceConfig], scan: &mut Scan) -> Result<(), Error> {
+        let words = data_words(declared);
+        take_data_words(self.start_work(move |engine| engine.start_data_words(words)).wait()?, scan);
+        Ok(())
     }
 
     /// Waits for the end of a scan that the engine has begun.

@@ -46,7 +46,7 @@ impl Frames {
 }
 
 /// Command and register address of each datagram of a frame.
-fn datagrams(frame: &[u8]) -> Vec<(u8, u16)> {
+pub fn datagrams(frame: &[u8]) -> Vec<(u8, u16)> {
     let (mut found, mut at) = (Vec::new(), ETHERNET_HEADER_LEN + ETHERCAT_HEADER_LEN);
     while let Some(header) = frame.get(at..at + OVERHEAD - 2) {
         found.push((header[0], u16::from_le_bytes([header[4], header[5]])));

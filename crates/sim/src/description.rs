@@ -156,6 +156,9 @@ pub struct DeviceDescription {
     pub identification: Option<u16>,
     /// Physical address of the identification switch; `None` = it is not in memory (protocol 4.3).
     pub id_switch_address: Option<u16>,
+    /// A word of the memory that the application sets at power-on and whenever it reaches INIT, as address and value:
+    /// an identification that the SII need not name (protocol 4.3).
+    pub data_word: Option<(u16, u16)>,
     /// Kind of each port.
     pub ports: [PortKind; 4],
     /// Usage of the FMMUs, also their number in the SII.
@@ -249,6 +252,7 @@ impl DeviceDescription {
             alias: 0,
             identification: None,
             id_switch_address: None,
+            data_word: None,
             ports: [PortKind::Mii, PortKind::Mii, PortKind::NotImplemented, PortKind::NotImplemented],
             fmmus: Vec::new(),
             controller_fmmus: None,

@@ -172,6 +172,7 @@ fn controller_config(description: &DeviceDescription) -> ControllerConfig {
         latches_fmmus: description.latches_fmmus,
         fmmu_count: description.controller_fmmus.unwrap_or(ControllerConfig::default().fmmu_count),
         latches_any_frame: description.latches_any_frame,
+        data_word: description.data_word,
         ..ControllerConfig::default()
     }
 }

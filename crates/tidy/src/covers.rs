@@ -118,9 +118,33 @@ pub fn unresolved_covers(tree: &Tree, features: &BTreeSet<String>) -> Vec<Findin
     findings
 }
 
+/// Chapters of statements each of which a test covers: what is claimed of device descriptions and of ENIs.
+const COVERED: [&str; 1] = ["ES-"];
+
+/// Claimed statements that no test covers.
+pub fn uncovered_statements(tree: &Tree) -> Vec<Finding> {
+    let covered: BTreeSet<String> = all(tree).into_iter().flat_map(|test| test.covers).collect();
+    let claimed = Pages::of(tree).statements;
+    let claimed = claimed.iter().filter(|id| COVERED.iter().any(|prefix| id.starts_with(prefix)));
+    let missing = claimed.filter(|id| !covered.contains(*id));
+    missing.map(|id| Finding::new("docs/protocol", 0, format!("no test covers `{id}`"))).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_claimed_statement_about_descriptions_needs_a_test() {
+        let page = "| ES-12 | claimed |\n| ES-13 | claimed |\n| CR-12 | claimed |\n";
+        let source = "// covers: ES-12\n#[test]\nfn it_holds() {}\n";
+        let files = vec![File::new("docs/protocol/a.md", page), File::new("crates/a/src/b.rs", source)];
+        let findings = uncovered_statements(&Tree { files });
+        assert_eq!(
+            findings.iter().map(ToString::to_string).collect::<Vec<_>>(),
+            ["docs/protocol: no test covers `ES-13`"]
+        );
+    }
 
     fn tree(source: &str) -> Tree {
         let page = "## 7.1 Delays\n| CR-12 | reported once |\n";

@@ -146,6 +146,12 @@ fn ids_covered_by_tests_exist() {
     none(covers::unresolved_covers(&tree, &features::ids(&tree)));
 }
 
+// covers: tree
+#[test]
+fn each_claimed_statement_about_descriptions_has_a_test() {
+    none(covers::uncovered_statements(&tree()));
+}
+
 // covers: library
 #[test]
 fn crates_are_private_or_fit_to_be_published() {

@@ -128,6 +128,9 @@ fn address(config: &SubDeviceConfig) -> eni::Address {
         ConfigAddress::Identification { value, offset } => {
             eni::Address { identification: Some(value), offset: Some(offset), ..none }
         }
+        ConfigAddress::DataWord { register, value, offset } => {
+            eni::Address { identification: Some(value), data_word: Some(register.0), offset: Some(offset), ..none }
+        }
         _ => none,
     }
 }

@@ -10,8 +10,8 @@ use ringcat::eni::{EniFile, EniImage, EniVariable, VariableType};
 use ringcat::network::{LoadedNetwork, NetworkFile};
 use ringcat::text::Names;
 use ringcat::{
-    ActivateError, Declaration, Direction, Error, JunctionConnection, JunctionMode, Scan, StationAddress, SubDeviceId,
-    SubDeviceInfo,
+    ActivateError, Declaration, Direction, Error, JunctionConnection, JunctionMode, Scan, StationAddress,
+    SubDeviceConfig, SubDeviceId, SubDeviceInfo,
 };
 
 use super::watched::{Watched, Work, work};
@@ -150,6 +150,11 @@ impl ConfiguredNetwork {
     /// Names of the SubDevices.
     pub fn names(&self) -> Names {
         Names(self.configuration().names())
+    }
+
+    /// The SubDevices that the file declares.
+    pub fn declared(&self) -> &[SubDeviceConfig] {
+        &self.configuration().declaration.subdevices
     }
 
     /// Names of the objects of each SubDevice: those of the file, then those of the scan.

@@ -214,7 +214,7 @@ pub(super) fn position(config: &SubDeviceConfig) -> usize {
     }
 }
 
-/// SubDevices that are declared by alias or identification.
+/// SubDevices that are declared by alias, identification or data word.
 fn by_mark(configs: &[SubDeviceConfig], found: &[SubDeviceInfo], info_of: &mut [Option<usize>], taken: &mut [bool]) {
     let aliases: BTreeMap<u16, usize> = (0..found.len()).rev().map(|at| (found[at].alias, at)).collect();
     let marks: BTreeMap<u16, usize> =
@@ -225,6 +225,10 @@ fn by_mark(configs: &[SubDeviceConfig], found: &[SubDeviceInfo], info_of: &mut [
                 aliases.get(&alias).map(|at| at + usize::from(offset))
             }
             ConfigAddress::Identification { value, offset } => marks.get(&value).map(|at| at + usize::from(offset)),
+            ConfigAddress::DataWord { register, value, offset } => {
+                let head = found.iter().position(|info| info.data_word(register) == Some(value));
+                head.map(|at| at + usize::from(offset))
+            }
             _ => None,
         };
         if let Some(info) = head.filter(|info| *info < found.len() && !taken[*info]) {

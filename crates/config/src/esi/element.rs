@@ -200,6 +200,11 @@ impl<'a> Element<'a> {
         self.file.note(self.line(), text.into());
     }
 
+    /// A notice about another line of the file.
+    pub fn note_at(&self, line: u32, text: String) {
+        self.file.note(line, text);
+    }
+
     /// An error about this element.
     pub fn error(&self, problem: EsiProblem) -> EsiError {
         let place = Some(self.file.lines.place(self.node.range().start));

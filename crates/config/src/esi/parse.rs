@@ -97,8 +97,9 @@ fn root(root: Element<'_>) -> Result<Esi, EsiError> {
     let references = root.children("InfoReference");
     let references = references.map(|it| Reference { line: it.line(), path: it.raw().trim().to_owned() }).collect();
     let groups = descriptions.child("Groups").into_iter().flat_map(|groups| groups.children("Group"));
-    let groups = groups.map(group).collect::<Result<_, _>>()?;
+    let groups: Vec<Group> = groups.map(group).collect::<Result<_, _>>()?;
     let devices = devices(descriptions, vendor.id)?;
+    note_groups(descriptions, &groups, &devices);
     let modules = modules(descriptions, vendor.id)?;
     Ok(Esi { version, vendor, groups, devices, modules, references, ..Esi::default() })
 }
@@ -129,6 +130,26 @@ fn group(element: Element<'_>) -> Result<Group, EsiError> {
         parent: element.attribute("ParentGroup").map(str::to_owned),
         sort_order: element.number_in("SortOrder")?,
     })
+}
+
+/// Notes a second group of a key, and keys without a group, each once (protocol ES-15).
+fn note_groups(descriptions: Element<'_>, groups: &[Group], devices: &[Device]) {
+    let mut lines: HashMap<&str, u32> = HashMap::new();
+    for group in groups {
+        if let Some(line) = lines.get(group.key.trim()) {
+            let text = format!("Group {}: the one of line {line} counts", shown(group.key.trim()));
+            descriptions.note_at(group.line, text);
+        } else {
+            lines.insert(group.key.trim(), group.line);
+        }
+    }
+    for device in devices {
+        let key = device.group.trim();
+        if !key.is_empty() && !lines.contains_key(key) {
+            descriptions.note_at(device.line, format!("GroupType {} names no group", shown(key)));
+            lines.insert(key, device.line);
+        }
+    }
 }
 
 fn devices(descriptions: Element<'_>, vendor_id: u32) -> Result<Vec<Device>, EsiError> {

@@ -132,6 +132,11 @@ pub(super) fn identification(auto_increment: u16, value: u16) -> Vec<EcatCommand
     ]
 }
 
+/// The identification of a hot connect group by a word in the memory of its head (protocol 4.3).
+pub(super) fn data_word(auto_increment: u16, register: RegisterAddress, value: u16) -> Vec<EcatCommand> {
+    vec![identify(auto_increment, Command::Aprd, register, vec![0; 2], Some(value))]
+}
+
 fn identify(
     auto_increment: u16,
     command: Command,

@@ -81,6 +81,7 @@ fn hot_connect(whole: &Configuration, index: usize, auto_increment: u16) -> Opti
     let identify = match configs[index].address {
         ConfigAddress::Alias { alias, .. } => init_commands::alias(auto_increment, alias),
         ConfigAddress::Identification { value, .. } => init_commands::identification(auto_increment, value),
+        ConfigAddress::DataWord { register, value, .. } => init_commands::data_word(auto_increment, register, value),
         _ => Vec::new(),
     };
     let name = whole.groups.get(group.0).cloned().unwrap_or_default();

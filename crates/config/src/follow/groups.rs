@@ -16,6 +16,7 @@ pub(super) fn follow(eni: &Eni, bus: &Bus, configs: &mut [SubDeviceConfig]) -> R
         let mark = group_mark(&group.identify);
         let address = |offset| match mark {
             Some(Mark::Alias(alias)) if alias != 0 => Ok(ConfigAddress::Alias { alias, offset }),
+            Some(Mark::DataWord { register, value }) => Ok(ConfigAddress::DataWord { register, value, offset }),
             Some(Mark::Identification(value)) => Ok(ConfigAddress::Identification { value, offset }),
             Some(Mark::Alias(_) | Mark::Eeprom { .. } | Mark::EepromWord { .. }) | None => {
                 let what = format!("identification of the hot connect group {}", crate::eni::quoted(&group.name));

@@ -2,6 +2,7 @@
 //! identification of hot connect groups (protocol 8.2).
 
 use ringcat_engine::config::Expected;
+use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::register::map;
 
 use super::messages::contradiction;
@@ -26,8 +27,15 @@ pub(super) enum Mark {
     },
     /// The alias, read from its register.
     Alias(u16),
-    /// The identification in AL status code (protocol 5.3), or in a word of its memory (protocol 4.3).
+    /// The identification in AL status code (protocol 5.3).
     Identification(u16),
+    /// The identification in a word of its memory (protocol 4.3).
+    DataWord {
+        /// Physical address.
+        register: RegisterAddress,
+        /// Expected value.
+        value: u16,
+    },
 }
 
 /// Memory in which a SubDevice may have its identification: digital inputs, user RAM, process RAM (protocol 3.13).
@@ -78,7 +86,7 @@ pub(super) fn marks(commands: &[EcatCommand]) -> Vec<(Mark, bool, Place)> {
                 found.extend(first_word.map(|id| (Mark::Identification(id), whole, command.place)));
             }
             word if MEMORY.contains(&word.0) && validate.data.len() == 2 => {
-                found.extend(first_word.map(|id| (Mark::Identification(id), whole, command.place)));
+                found.extend(first_word.map(|value| (Mark::DataWord { register: word, value }, whole, command.place)));
             }
             _ => {}
         }
@@ -157,14 +165,14 @@ pub(super) fn is_eeprom_address(command: &EcatCommand) -> bool {
     (ado == map::SII_CONTROL || ado == map::SII_ADDRESS) && command.datagram.command.writes()
 }
 
-/// The alias or identification of a group; an alias may be read from the EEPROM or from its register.
+/// The alias, identification or data word of a group; an alias may be read from the EEPROM or from its register.
 pub(super) fn group_mark(commands: &[EcatCommand]) -> Option<Mark> {
     marks(commands).into_iter().find_map(|(mark, whole, _)| match mark {
         Mark::Eeprom { word: WORD_ALIAS, value } => Some(Mark::Alias(value as u16)),
         Mark::EepromWord { word: WORD_ALIAS, value } => Some(Mark::Alias(value)),
         Mark::Eeprom { .. } | Mark::EepromWord { .. } => None,
-        Mark::Alias(_) | Mark::Identification(_) if whole => Some(mark),
-        Mark::Alias(_) | Mark::Identification(_) => None,
+        Mark::Alias(_) | Mark::Identification(_) | Mark::DataWord { .. } if whole => Some(mark),
+        Mark::Alias(_) | Mark::Identification(_) | Mark::DataWord { .. } => None,
     })
 }
 

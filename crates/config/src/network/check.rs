@@ -22,6 +22,8 @@ const MAX_UNDER_WAY: u8 = ringcat_engine::main_device::MAX_UNDER_WAY;
 const LONGEST_PERIOD_S: u64 = 10;
 /// Largest amount of a shift or a cycle of SYNC signals.
 const LONGEST_SHIFT_NS: i64 = i32::MAX as i64;
+/// Addresses of memory that may hold an identification: digital inputs, user memory, process memory.
+const DATA_WORDS: std::ops::RangeInclusive<u16> = 0x0F00..=0xFFFE;
 /// Bytes of an IP host name.
 const HOST_NAME: usize = 32;
 
@@ -213,6 +215,15 @@ fn of_subdevice(file: &NetworkFile, index: usize, subdevice: &SubDevice, names: 
     let places = [subdevice.position, subdevice.alias, subdevice.identification];
     if places.iter().flatten().count() > 1 {
         return fault(["position".into()], "expected one of position, alias and identification");
+    }
+    if let Some(word) = subdevice.identification_word {
+        if subdevice.identification.is_none() {
+            return fault(["identification_word".into()], "expected a key identification, the value of the word");
+        }
+        if !DATA_WORDS.contains(&word) {
+            let message = format!("expected an address from 0x0F00 to 0xFFFE, got {word:#06x}");
+            return fault(["identification_word".into()], message);
+        }
     }
     if subdevice.offset.is_some() && subdevice.alias.is_none() && subdevice.identification.is_none() {
         return fault(["offset".into()], "an offset counts from an alias or an identification");

@@ -15,6 +15,7 @@ use ringcat_engine::info::Direction;
 use ringcat_engine::layout::LrwPolicy;
 use ringcat_engine::main_device::{Declaration, DomainConfig, DomainMember, Required};
 use ringcat_engine::{JunctionConnection, JunctionMode};
+use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::AlState;
 
 use super::commands;
@@ -115,7 +116,7 @@ impl NetworkFile {
             if let Some(group) = &subdevice.group {
                 if groups.last() == Some(group) {
                     behind += 1;
-                    config.address = behind_head(head, behind);
+                    config.address = head.behind(behind);
                 } else {
                     groups.push(group.clone());
                     (head, behind) = (own, 0);
@@ -230,16 +231,11 @@ const fn direction(sync_manager: &SyncManager) -> Direction {
 fn address(subdevice: &SubDevice) -> Option<ConfigAddress> {
     let offset = subdevice.offset.unwrap_or(0);
     let alias = subdevice.alias.map(|alias| ConfigAddress::Alias { alias, offset });
-    let identification = subdevice.identification.map(|value| ConfigAddress::Identification { value, offset });
+    let identification = subdevice.identification.map(|value| match subdevice.identification_word {
+        Some(word) => ConfigAddress::DataWord { register: RegisterAddress(word), value, offset },
+        None => ConfigAddress::Identification { value, offset },
+    });
     subdevice.position.map(ConfigAddress::Position).or(alias).or(identification)
-}
-
-const fn behind_head(head: ConfigAddress, offset: u16) -> ConfigAddress {
-    match head {
-        ConfigAddress::Alias { alias, .. } => ConfigAddress::Alias { alias, offset },
-        ConfigAddress::Identification { value, .. } => ConfigAddress::Identification { value, offset },
-        other => other,
-    }
 }
 
 /// The part of a SubDevice in a domain: SyncManagers name their domain, others have that of the SubDevice.

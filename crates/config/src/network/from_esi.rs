@@ -56,6 +56,7 @@ impl SubDevice {
             ports: ports(device),
             mailbox: mailbox(device),
             timeouts: timeouts(device),
+            eeprom_to_pdi: device.eeprom.as_ref().is_some_and(|eeprom| eeprom.assign_to_pdi),
             watchdog_divider: device.controller.reg_0400,
             watchdog_pdi: device.controller.reg_0410,
             watchdog_process_data: device.controller.reg_0420,
@@ -74,14 +75,40 @@ impl SubDevice {
             }
             clock_notices(device, mode, subdevice.sync.as_ref(), &mut from);
         }
-        if device.use_lrd_lwr {
-            from.note("UseLrdLwr: its EEPROM decides whether it is in an LRW".into());
-        }
+        from.note_left_out(device);
         for command in &selection.commands {
             subdevice.startup.extend(startup(command, &mut from));
         }
         valid(selection, &subdevice, cycle)?;
         Ok(FromEsi { subdevice, notices: from.notices })
+    }
+}
+
+impl Notes {
+    /// Settings of a device that a network file has no place for.
+    fn note_left_out(&mut self, device: &Device) {
+        let aoe = device.mailbox.as_ref().and_then(|mailbox| mailbox.aoe.as_ref());
+        let is_separate = device.sync_units.iter().any(|unit| unit.separate);
+        let has_frame = device.sync_units.iter().any(|unit| unit.separate_frame);
+        let potential = device.clock.as_ref().is_some_and(|clock| clock.potential_reference);
+        for (is_stated, notice) in [
+            (device.use_lrd_lwr, "UseLrdLwr: its EEPROM decides whether it is in an LRW"),
+            (
+                aoe.is_some_and(|aoe| aoe.generate_net_id),
+                "AoE GenerateOwnNetId: no AMS net id is chosen; a start-up command may write one",
+            ),
+            (
+                aoe.is_some_and(|aoe| aoe.initialize_net_id),
+                "AoE InitializeOwnNetId: no AMS net id is sent to it; a start-up command may write one",
+            ),
+            (is_separate, "Su SeparateSu: its process data shares datagrams; a `domain` of its own separates it"),
+            (has_frame, "Su SeparateFrame: its process data shares frames with other SubDevices"),
+            (potential, "PotentialReferenceClock: choose the reference clock by `reference` of the table `clocks`"),
+        ] {
+            if is_stated {
+                self.note(notice.into());
+            }
+        }
     }
 }
 

@@ -218,6 +218,7 @@ fn subdevice(out: &mut Text, of: &SubDevice, implied: Option<u16>) {
     out.some("position", of.position.or(implied));
     out.some("alias", of.alias);
     out.some("identification", of.identification);
+    out.some("identification_word", of.identification_word.map(hex_4));
     out.some("offset", of.offset.filter(|offset| *offset != 0));
     out.name("group", &of.group);
     out.flag("optional", of.optional);

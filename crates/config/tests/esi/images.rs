@@ -254,3 +254,23 @@ fn images_of_vendors_are_built_byte_for_byte_or_differ_in_listed_fields() {
         "{other:?}: read the difference; RINGCAT_WRITE_SII_DIFFERENCES=1 cargo test -p ringcat-config images lists it"
     );
 }
+
+// covers: ES-177
+#[test]
+fn the_size_word_is_that_of_the_size_in_kibit() {
+    let empty = OUTPUTS.replace("<ByteSize>512<", "<ByteSize>SIZE<");
+    assert_ne!(empty, OUTPUTS);
+    let sizes = [(128, None), (256, None), (512, Some(3)), (1024, Some(7)), (2048, Some(0x0F)), (4096, Some(0x1F))];
+    for (size, word) in sizes.into_iter().chain([(15_360, Some(0x77))]) {
+        let esi = read(&empty.replace("SIZE", &size.to_string()));
+        let mut options = SiiOptions::default();
+        options.physical_layer = Some(0);
+        let image = sii::build(&esi, &esi.devices[0], &options);
+        let Some(word) = word else {
+            assert!(image.is_err(), "{size}: the image is longer");
+            continue;
+        };
+        let image = image.unwrap_or_else(|error| panic!("{error}")).bytes;
+        assert_eq!((image.len(), &image[0x7C..0x7E]), (size, &[word, 0][..]));
+    }
+}

@@ -134,3 +134,37 @@ fn unusual_files_are_read_and_noted() {
     let latin: Vec<u8> = declared.chars().map(|character| character as u32 as u8).collect();
     assert_eq!(esi::read("latin.xml", &latin).unwrap().groups[0].name.in_language(1031), "Acme Kl\u{e4}mmen");
 }
+
+// covers: esi-read, ES-15, ES-20
+#[test]
+fn second_definitions_and_names_of_nothing_are_notices_with_their_lines() {
+    let acme = ACME;
+    let object = "<Object><Index>#x8000</Index><Name>Second</Name><Type>UDINT</Type><BitSize>32</BitSize></Object>";
+    let group = "<Group SortOrder=\"30\"><Type>AcmeIo</Type><Name>Second</Name></Group></Groups>";
+    let item = "<SubItem><SubIdx>2</SubIdx><Name>Second</Name><Type>UINT</Type><BitSize>16</BitSize>\
+                <BitOffs>48</BitOffs></SubItem></DataType>";
+    let filter = "<Name>Filter time</Name>";
+    let at = acme.find(filter).expect("it is there");
+    let end = at + acme[at..].find("</DataType>").expect("it ends");
+    let twice = [&acme[..end], item, &acme[end + "</DataType>".len()..]].concat();
+    let plain = acme_of(acme).notices.len();
+    for (text, expected) in [
+        (acme.replacen("</Objects>", &format!("{object}</Objects>"), 1), "Object 0x8000 of line 87 is there already"),
+        (acme.replacen("</Groups>", group, 1), "Group \"AcmeIo\": the one of line 11 counts"),
+        (acme.replacen("<GroupType>AcmeDrives<", "<GroupType>Acme<", 1), "GroupType \"Acme\" names no group"),
+        (acme.replacen("<Type>DT6000</Type>", "<Type>NOTYPE</Type>", 1), "the type \"NOTYPE\" is not described"),
+        (acme.replacen("<BaseType>UINT<", "<BaseType>NOBASE<", 1), "the type \"NOBASE\" is not described"),
+        (twice, "SubIdx 2 is there twice, the first counts"),
+    ] {
+        let esi = acme_of(&text);
+        let added: Vec<String> = esi.notices.iter().map(ToString::to_string).collect();
+        assert_eq!(added.len(), plain + 1, "{expected}: {added:?}");
+        assert!(added.iter().any(|notice| notice.contains(expected)), "{expected}: {added:?}");
+    }
+    // The first object counts.
+    let text = acme.replacen("</Objects>", &format!("{object}</Objects>"), 1);
+    let esi = acme_of(&text);
+    let objects = esi.devices.iter().flat_map(|device| &device.profiles).flat_map(|it| it.dictionary.as_deref());
+    let settings: Vec<_> = objects.flat_map(|it| &it.objects).filter(|it| it.index.index == 0x8000).collect();
+    assert_eq!(settings.iter().map(|it| it.name.english()).collect::<Vec<_>>(), ["AI Settings Ch.1"]);
+}

@@ -117,6 +117,63 @@ fn a_shift_adds_time_and_part_of_the_cycle_and_lost_settings_are_reported() {
     assert!(added(&from(&lrw).1)[0].starts_with("UseLrdLwr: "));
 }
 
+// covers: esi-declare, ES-27
+#[test]
+fn product_code_and_serial_number_are_compared_as_the_file_says() {
+    let checked = |attributes: &str| {
+        let text = ACME.replacen("ProductCode=\"#x00003001\"", &format!("ProductCode=\"#x00003001\"{attributes}"), 1);
+        let subdevice = declared(&acme_of(&text), DRIVE, &Choices::default());
+        (subdevice.product, subdevice.serial)
+    };
+    let product = Some(0x3001);
+    for (attributes, expected) in [
+        ("", (product, None)),
+        (" CheckProductCode=\"EQ\"", (product, None)),
+        (" CheckProductCode=\"NONE\"", (None, None)),
+        (" SerialNo=\"77\"", (product, None)),
+        (" SerialNo=\"77\" CheckSerialNo=\"NONE\"", (product, None)),
+        (" SerialNo=\"77\" CheckSerialNo=\"EQ\"", (product, Some(77))),
+    ] {
+        assert_eq!(checked(attributes), expected, "{attributes}");
+    }
+}
+
+// covers: esi-declare, ES-53
+#[test]
+fn each_setting_without_a_place_in_a_network_file_is_a_notice() {
+    const CASES: [(&str, &str, &str); 7] = [
+        ("<Dc>", "<Dc PotentialReferenceClock=\"1\">", "PotentialReferenceClock: "),
+        ("<EoE ", "<AoE InitializeOwnNetId=\"1\"/><EoE ", "AoE InitializeOwnNetId: no AMS net id is sent"),
+        ("<EoE ", "<AoE GenerateOwnNetId=\"1\"/><EoE ", "AoE GenerateOwnNetId: no AMS net id is chosen"),
+        ("<Mailbox", "<Su SeparateSu=\"1\"/><Mailbox", "Su SeparateSu: "),
+        ("<Mailbox", "<Su SeparateFrame=\"1\"/><Mailbox", "Su SeparateFrame: "),
+        (" ProductCode", " UseLrdLwr=\"1\" ProductCode", "UseLrdLwr: "),
+        ("<Name>AM01 M", "<SubDevice ProductCode=\"#x3002\" RevisionNo=\"1\"/><Name>AM01 M", "a further SubDevice"),
+    ];
+    // The last device of the file.
+    let last = ACME.rfind("<Type ProductCode").expect("it has devices");
+    let from = |from: &str, to: &str| {
+        let at = ACME[last..].find(from).unwrap_or_else(|| panic!("{from}")) + last;
+        let text = [&ACME[..at], to, &ACME[at + from.len()..]].concat();
+        let esi = acme_of(&text);
+        let device = esi.devices.last().expect("it has devices");
+        let choices = Choices::default();
+        let selection = select(&esi, device, &choices).unwrap_or_else(|error| panic!("{error}"));
+        let from = SubDevice::from_esi(&selection, CYCLE, 1033).unwrap_or_else(|error| panic!("{error}"));
+        (from.subdevice.eeprom_to_pdi, from.notices.iter().map(ToString::to_string).collect::<Vec<_>>())
+    };
+    let (assigned, plain) = from("<Type ProductCode", "<Type ProductCode");
+    assert!(!assigned);
+    for (old, new, expected) in CASES {
+        let (_, notices) = from(old, new);
+        let added: Vec<&String> = notices.iter().filter(|text| !plain.contains(text)).collect();
+        assert_eq!(added.len(), 1, "{new}: {added:?}");
+        assert!(added[0].contains(expected), "{new}: {added:?}");
+    }
+    let (assigned, notices) = from("<Eeprom>", "<Eeprom AssignToPdi=\"1\">");
+    assert_eq!((assigned, notices), (true, plain), "the network file says it");
+}
+
 // covers: esi-declare, ES-47, ES-50
 #[test]
 fn pdos_are_chosen_by_the_rules_of_the_file() {

@@ -1,7 +1,10 @@
 //! Commands of a SubDevice in written files, as those of TwinCAT and EC-Engineer (protocol 8.3).
 
 use ringcat_config::ExportOptions;
-use ringcat_config::eni::{Eni, SubDevice, Target, Transition};
+use ringcat_config::eni::{Eni, Port, Requires, SubDevice, Target, Transition};
+use ringcat_wire::address::LogicalAddress;
+use ringcat_wire::command::Command;
+use ringcat_wire::register::{Fmmu, SyncManager, SyncManagerActivate, SyncManagerControl};
 
 use crate::{CELL, model, network};
 
@@ -143,8 +146,10 @@ fn addresses_cables_groups_and_places_of_a_written_file_are_those_of_the_network
     for head in heads {
         let group = eni.subdevices[head].hot_connect.as_ref().expect("a group");
         assert!(eni.subdevices[head].previous_ports.is_empty(), "a head has no place");
-        assert!(group.members >= 1 && !group.identify.is_empty());
+        assert!(!group.identify.is_empty());
     }
+    let members = eni.subdevices.iter().filter_map(|it| Some(it.hot_connect.as_ref()?.members));
+    assert_eq!(members.collect::<Vec<_>>(), [2, 1], "the head included");
     let mut plugged = network(CELL);
     let into = plugged.subdevice[1].plugged_into.clone();
     plugged.subdevice[2].plugged_into = into;
@@ -154,8 +159,101 @@ fn addresses_cables_groups_and_places_of_a_written_file_are_those_of_the_network
     let drive = &eni.subdevices[1];
     let port = &drive.previous_ports[0];
     assert!(port.selected && port.station == Some(1001));
+    let declared = network(CELL).subdevice[1].plugged_into.as_ref().expect("it is plugged into the coupler").port;
+    let number = [Port::A, Port::B, Port::C, Port::D].iter().position(|it| *it == port.port);
+    assert_eq!(number, Some(declared.into()), "the letter of the port");
     let data = drive.process_data.as_ref().expect("process data");
     assert_eq!((data.send.len(), data.receive.len(), data.send[0].length), (1, 1, 56));
     let mailbox = drive.mailbox.as_ref().expect("a mailbox");
     assert!(mailbox.eoe.iter().all(|it| it.mac.is_none() && it.ip.is_none() && !it.data.is_empty()));
+}
+
+// covers: ES-115, eni-run
+#[test]
+fn a_written_file_begins_with_the_commands_for_the_whole_bus() {
+    let expected: [(u16, usize, &[u8]); 9] = [
+        (0x0010, 2, &[]),
+        (0x0300, 8, &[]),
+        (0x0600, 256, &[]),
+        (0x0800, 256, &[]),
+        (0x0910, 32, &[]),
+        (0x0981, 1, &[]),
+        (0x0930, 2, &[0x00, 0x10]),
+        (0x0934, 2, &[0x00, 0x0C]),
+        (0x0103, 1, &[]),
+    ];
+    let commands = exported().main_device.init_commands;
+    assert_eq!(commands.len(), expected.len());
+    for (command, (register, length, data)) in commands.iter().zip(expected) {
+        let Target::Register { adp, ado } = command.datagram.target else { panic!("{command:?}") };
+        let mut bytes = data.to_vec();
+        bytes.resize(length, 0);
+        assert_eq!((command.datagram.command, adp, ado.0), (Command::Bwr, 0, register));
+        assert_eq!((&command.datagram.data, command.datagram.count), (&bytes, None), "{register:#06x}");
+        assert_eq!((command.retries, command.requires), (3, Some(Requires::Cycle)), "{register:#06x}");
+        assert!(command.before_subdevices && command.transitions == [Transition::Ip], "{register:#06x}");
+    }
+}
+
+// covers: ES-175
+#[test]
+fn fmmus_and_sync_managers_have_the_bytes_of_files_of_tools() {
+    let outputs = |logical, length, physical_start| {
+        let logical_start = LogicalAddress(logical);
+        let fmmu = Fmmu { logical_start, length, logical_stop_bit: 7, physical_start, ..Fmmu::default() };
+        Fmmu { write: true, active: true, ..fmmu }.encode()
+    };
+    let hex = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02X}")).collect::<String>();
+    assert_eq!(hex(&outputs(0x0100_0000, 4, 0x1100)), "00000001040000070011000201000000");
+    assert_eq!(hex(&outputs(0x0100_0004, 1, 0x0F00)), "0400000101000007000F000201000000");
+    for (bit, expected) in [(0, "00000009010000000D08000101000000"), (3, "00000009010003030D08000101000000")] {
+        let logical = LogicalAddress(0x0900_0000);
+        let state = Fmmu {
+            logical_start: logical,
+            length: 1,
+            logical_start_bit: bit,
+            logical_stop_bit: bit,
+            physical_start: 0x080D,
+            read: true,
+            active: true,
+            ..Fmmu::default()
+        };
+        assert_eq!(hex(&state.encode()), expected, "bit {bit}");
+    }
+    for (start, length, control, is_active, expected) in
+        [(0x0F00, 1, 0x44, true, "000F010044000100"), (0x1180, 0, 0, false, "8011000000000000")]
+    {
+        let manager = SyncManager {
+            start,
+            length,
+            control: SyncManagerControl::from_bits(control),
+            activate: SyncManagerActivate::from_bits(is_active.into()),
+            ..SyncManager::default()
+        };
+        assert_eq!(hex(&manager.encode()), expected);
+    }
+}
+
+// covers: ES-178, eni-run
+#[test]
+fn written_files_count_subdevices_down_and_read_identities_by_word() {
+    let eni = exported();
+    let places: Vec<u16> = eni.subdevices.iter().take(4).filter_map(|it| it.auto_increment).collect();
+    assert_eq!(places, [0, 65535, 65534, 65533]);
+    let all = network(CELL).subdevice.iter().any(|it| it.vendor.is_some() && it.product.is_some());
+    assert!(all, "identities are compared");
+    for subdevice in &eni.subdevices {
+        let words: Vec<Vec<u8>> = at(subdevice, Transition::Ip)
+            .into_iter()
+            .filter(|(register, data, _)| {
+                *register == 0x0502 && data.get(2).is_some_and(|word| (8..=0xE).contains(word))
+            })
+            .map(|(_, data, _)| data)
+            .collect();
+        for data in &words {
+            assert_eq!((data[..2].to_vec(), data[3..].to_vec()), (vec![0, 1], vec![0; 3]), "{data:02x?}");
+        }
+        let order: Vec<u8> = words.iter().map(|data| data[2]).collect();
+        assert!(order.starts_with(&[8, 0xA]) && order.is_sorted(), "{order:x?}");
+    }
 }

@@ -1,12 +1,15 @@
 //! ENIs from network files.
 
+use ringcat_config::eni::Target;
 use ringcat_config::{Export, ExportOptions, LrwUse};
 use ringcat_engine::config::{ConfigAddress, ReferenceClock, StartupAction, SyncManagerRole, Transition};
 use ringcat_engine::declared::{GroupId, SubDeviceId};
 use ringcat_engine::info::Direction;
+use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::AlState;
+use ringcat_wire::command::Command;
 
-use crate::{CELL, model, network};
+use crate::{CELL, again, model, network};
 
 // covers: eni-run
 #[test]
@@ -203,4 +206,23 @@ fn names_of_any_characters_give_a_well_formed_file() {
         assert_eq!(read.main_device.name, expected.trim());
         assert_eq!(export.configuration.subdevices[3].name, expected.trim());
     }
+}
+
+// covers: 4.3, 8.2, eni-run
+#[test]
+fn a_group_found_by_a_data_word_is_exported_with_the_address_of_the_word() {
+    let text = CELL.replace("identification = 9\n", "identification = 9\nidentification_word = 0x1000\n");
+    let file = network(&text);
+    let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let expected = ConfigAddress::DataWord { register: RegisterAddress(0x1000), value: 9, offset: 0 };
+    assert_eq!(file.configuration().declaration.subdevices[4].address, expected);
+    assert_eq!(export.configuration.declaration.subdevices[4].address, expected);
+    let written = model(&export.text);
+    let group = written.subdevices[4].hot_connect.as_ref().expect("a group");
+    let [identify] = &group.identify[..] else { panic!("one command reads the word: {:?}", group.identify) };
+    let Target::Register { ado, .. } = identify.datagram.target else { panic!("it reads memory") };
+    let validate = identify.validate.as_ref().expect("it compares the word");
+    assert_eq!((identify.datagram.command, ado.0, &validate.data[..]), (Command::Aprd, 0x1000, &[9, 0][..]));
+    let again = again(&export.text, &ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(again.configuration.declaration.subdevices[4].address, expected, "and once more");
 }

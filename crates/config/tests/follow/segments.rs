@@ -4,7 +4,7 @@ use ringcat_config::eni::Port;
 use ringcat_engine::config::{ConfigAddress, PdoAssignment, PdoEntry, PdoMapping, ReferenceClock};
 use ringcat_engine::declared::{GroupId, SubDeviceId};
 use ringcat_engine::info::Direction;
-use ringcat_wire::address::StationAddress;
+use ringcat_wire::address::{RegisterAddress, StationAddress};
 
 use crate::{SMALL, changed, configured, has_notice, refused};
 
@@ -74,10 +74,10 @@ fn a_group_may_be_identified_by_its_eeprom_or_its_switch() {
     let switch = changed(&[(HEAD, &GROUP.replace("<Ado>18</Ado>", "<Ado>308</Ado>"))]);
     assert_eq!(addresses(&switch)[2], ConfigAddress::Identification { value: 0x1234, offset: 1 });
     // A data word: digital inputs, process RAM.
-    for word in ["<Ado>3864</Ado>", "<Ado>4096</Ado>"] {
-        let word = GROUP.replace("<Ado>18</Ado>", word);
-        let expected = ConfigAddress::Identification { value: 0x1234, offset: 0 };
-        assert_eq!(addresses(&changed(&[(HEAD, &word)]))[1], expected);
+    for register in [3864, 4096] {
+        let word = GROUP.replace("<Ado>18</Ado>", &format!("<Ado>{register}</Ado>"));
+        let at = |offset| ConfigAddress::DataWord { register: RegisterAddress(register), value: 0x1234, offset };
+        assert_eq!(addresses(&changed(&[(HEAD, &word)]))[1..3], [at(0), at(1)]);
         let masked = word.replace("<Data>3412</Data>", "<Data>3402</Data><DataMask>ff0f</DataMask>");
         assert!(refused(&[(HEAD, &masked)]).contains("a whole data word"), "a part of a word is none");
     }

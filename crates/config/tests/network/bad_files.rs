@@ -83,6 +83,8 @@ const CHANGES: &[(&str, &str, &str)] = &[
     ),
     ("under_way = 2", "under_way = 5", "domain[0].under_way: expected 1 to 4, got 5"),
     ("alias = 5\n", "", "subdevice[2].group: the head of group \"tool 1\" needs an alias or an identification"),
+    ("identification = 9\n", "alias = 9\n", "subdevice[4].identification_word: expected a key identification"),
+    ("identification_word = 0x1000", "identification_word = 0x0e00", "expected an address from 0x0F00 to 0xFFFE"),
     ("offset = 2", "position = 4", "subdevice[4].position: expected one of position, alias and identification"),
     ("port = 2 }", "port = 4 }", "subdevice[1].plugged_into.port: expected a port from 0 to 3, got 4"),
     (

@@ -11,6 +11,7 @@ use ringcat_engine::declared::GroupId;
 use ringcat_engine::info::Direction;
 use ringcat_engine::layout::LrwPolicy;
 use ringcat_engine::main_device::Required;
+use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::mailbox::soe::{Idn, SoeElements};
 
 use crate::WHOLE;
@@ -40,7 +41,8 @@ fn comments_order_of_keys_and_implied_values_do_not_change_the_digest() {
     let changed = WHOLE.replace("period = \"250us\"", "period = \"251us\"");
     let changed = NetworkFile::read("changed.toml", changed.as_bytes()).expect("the file is valid");
     assert_ne!(changed.digest(), whole().digest());
-    assert_eq!(whole().digest().to_string().len(), 64);
+    // The SHA-256 of the canonical text, as `sha256sum` prints it.
+    assert_eq!(whole().digest().to_string(), "c2abc93e411b9daf97439aea6ca12f18d61cce21b778700529546dcd237d75c6");
 }
 
 // covers: network-file
@@ -56,7 +58,8 @@ fn every_key_is_in_the_declaration() {
     assert_eq!(drive.expected.revision, Some(0x10_0000));
     assert_eq!((tool.address, tool.group), (ConfigAddress::Alias { alias: 5, offset: 0 }, Some(GroupId(0))));
     assert_eq!((second.address, second.group), (ConfigAddress::Alias { alias: 5, offset: 1 }, Some(GroupId(0))));
-    assert_eq!(switch.address, ConfigAddress::Identification { value: 9, offset: 2 });
+    let word = ConfigAddress::DataWord { register: RegisterAddress(0x1000), value: 9, offset: 2 };
+    assert_eq!(switch.address, word);
     assert_eq!(configuration.groups, ["tool 1"]);
     assert_eq!((declaration.required, declaration.lrw), (Required::All, LrwPolicy::PerSubDevice));
     let pdos = drive.pdos.as_ref().expect("PDOs");

@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use ringcat_wire::address::RegisterAddress;
+
 use crate::info::SubDeviceInfo;
 
 /// Expected place of a SubDevice.
@@ -26,22 +28,45 @@ pub enum ConfigAddress {
         /// Number of SubDevices behind it.
         offset: u16,
     },
+    /// `offset` SubDevices behind the one with this value in a word of its memory, which the SII need not name
+    /// (protocol 4.3). The word is read between the scan and the activation (`MainDevice::start_connection_check`).
+    DataWord {
+        /// Physical address of the word.
+        register: RegisterAddress,
+        /// Its value.
+        value: u16,
+        /// Number of SubDevices behind it.
+        offset: u16,
+    },
 }
 
 impl ConfigAddress {
     /// Number of SubDevices behind the one with the alias or identification.
     pub(super) fn offset(self) -> usize {
         match self {
-            ConfigAddress::Alias { offset, .. } | ConfigAddress::Identification { offset, .. } => offset.into(),
+            ConfigAddress::Alias { offset, .. }
+            | ConfigAddress::Identification { offset, .. }
+            | ConfigAddress::DataWord { offset, .. } => offset.into(),
             ConfigAddress::Position(_) => 0,
         }
     }
 
+    /// Address of the data word from which the address counts.
+    pub const fn data_word(self) -> Option<RegisterAddress> {
+        match self {
+            ConfigAddress::DataWord { register, .. } => Some(register),
+            ConfigAddress::Position(_) | ConfigAddress::Alias { .. } | ConfigAddress::Identification { .. } => None,
+        }
+    }
+
     /// The address this number of places further behind.
-    pub(super) fn behind(self, places: u16) -> ConfigAddress {
+    pub fn behind(self, places: u16) -> ConfigAddress {
         match self {
             ConfigAddress::Alias { alias, .. } => ConfigAddress::Alias { alias, offset: places },
             ConfigAddress::Identification { value, .. } => ConfigAddress::Identification { value, offset: places },
+            ConfigAddress::DataWord { register, value, .. } => {
+                ConfigAddress::DataWord { register, value, offset: places }
+            }
             ConfigAddress::Position(position) => ConfigAddress::Position(position.saturating_add(places)),
         }
     }
@@ -51,6 +76,7 @@ impl ConfigAddress {
         match self {
             ConfigAddress::Alias { alias, .. } => alias != 0 && alias == info.alias,
             ConfigAddress::Identification { value, .. } => info.identification == Some(value),
+            ConfigAddress::DataWord { register, value, .. } => info.data_word(register) == Some(value),
             ConfigAddress::Position(_) => false,
         }
     }
@@ -63,6 +89,9 @@ impl ConfigAddress {
                 match self.0 {
                     ConfigAddress::Alias { alias, .. } => write!(f, "alias {alias}"),
                     ConfigAddress::Identification { value, .. } => write!(f, "identification {value}"),
+                    ConfigAddress::DataWord { register, value, .. } => {
+                        write!(f, "data word {value} at {register}")
+                    }
                     ConfigAddress::Position(position) => write!(f, "position {position}"),
                 }
             }
@@ -75,7 +104,9 @@ impl fmt::Display for ConfigAddress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             ConfigAddress::Position(_) => self.mark().fmt(f),
-            ConfigAddress::Alias { offset, .. } | ConfigAddress::Identification { offset, .. } => {
+            ConfigAddress::Alias { offset, .. }
+            | ConfigAddress::Identification { offset, .. }
+            | ConfigAddress::DataWord { offset, .. } => {
                 write!(f, "{} offset {offset}", self.mark())
             }
         }

@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 use core::time::Duration;
 
+use ringcat_wire::address::RegisterAddress;
 use ringcat_wire::al::AlState;
 use ringcat_wire::mailbox::soe::Idn;
 
@@ -33,6 +34,11 @@ impl SubDeviceConfig {
     /// A SubDevice of any identity with an explicit device identification, at any place.
     pub fn at_identification(value: u16) -> SubDeviceConfig {
         SubDeviceConfig::at(ConfigAddress::Identification { value, offset: 0 })
+    }
+
+    /// A SubDevice of any identity with this value in a word of its memory, at any place.
+    pub fn at_data_word(register: RegisterAddress, value: u16) -> SubDeviceConfig {
+        SubDeviceConfig::at(ConfigAddress::DataWord { register, value, offset: 0 })
     }
 
     /// The SubDevice that a scan found: at its position, with its vendor and product; everything else from its SII.

@@ -1,16 +1,19 @@
 //! Hot connect groups: consecutive SubDevices that may be present or absent, at any place of the segment.
 //!
-//! The first one, the head, is found by alias or explicit device identification; the others follow it in the order of
-//! the processing units. This module matches what the scan found; the procedures match groups that join later.
+//! The first one, the head, is found by alias, explicit device identification or data word; the others follow it in the
+//! order of the processing units. This module matches what the scan found; the procedures match groups that join later.
 
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
+
+use ringcat_wire::address::RegisterAddress;
 
 use super::matching::{Marked, at_place, missing};
 use super::resolution::Resolution;
 use super::{ConfigAddress, SubDeviceConfig};
 use crate::declared::GroupId;
 use crate::info::SubDeviceInfo;
+use crate::order::InOrder;
 
 /// A hot connect group.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -21,7 +24,7 @@ pub struct Group {
 
 impl Group {
     /// A group of one: its head, declared [at an alias](SubDeviceConfig::at_alias) with offset 0 or [with an
-    /// identification](SubDeviceConfig::at_identification).
+    /// identification](SubDeviceConfig::at_identification) or [a data word](SubDeviceConfig::at_data_word).
     pub fn new(head: SubDeviceConfig) -> Group {
         Group { members: Vec::from([head]) }
     }
@@ -75,11 +78,22 @@ pub(super) fn find(
     }
 }
 
+/// The data words that declarations name, each once.
+pub fn data_words<'a>(configs: impl IntoIterator<Item = &'a SubDeviceConfig>) -> Vec<RegisterAddress> {
+    let mut words: Vec<RegisterAddress> = configs.into_iter().filter_map(|it| it.address.data_word()).collect();
+    words.put_in_order();
+    words.dedup();
+    words
+}
+
 /// Whether a declaration can be the head of a group.
 pub(crate) fn can_be_head(config: &SubDeviceConfig) -> bool {
     match config.address {
         ConfigAddress::Alias { alias, offset: 0 } => alias != 0,
-        ConfigAddress::Identification { offset: 0, .. } => true,
-        ConfigAddress::Alias { .. } | ConfigAddress::Identification { .. } | ConfigAddress::Position(_) => false,
+        ConfigAddress::Identification { offset: 0, .. } | ConfigAddress::DataWord { offset: 0, .. } => true,
+        ConfigAddress::Alias { .. }
+        | ConfigAddress::Identification { .. }
+        | ConfigAddress::DataWord { .. }
+        | ConfigAddress::Position(_) => false,
     }
 }

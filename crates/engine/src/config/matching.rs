@@ -2,6 +2,8 @@
 
 use alloc::vec::Vec;
 
+use ringcat_wire::address::RegisterAddress;
+
 use super::resolution::{ConfigError, Resolution};
 use super::steps::step;
 use super::{ConfigAddress, IdentityMismatch, SubDeviceConfig};
@@ -37,10 +39,11 @@ pub(super) fn missing(declared: &SubDeviceConfig, config: usize, error: ConfigEr
     if declared.optional { Resolution::Absent { config, error } } else { Resolution::Failed { config, error } }
 }
 
-/// The SubDevices by their aliases and identifications, in their order.
+/// The SubDevices by their aliases, identifications and data words, in their order.
 pub(super) struct Marked {
     aliases: Vec<(u16, usize)>,
     identifications: Vec<(u16, usize)>,
+    data_words: Vec<((RegisterAddress, u16), usize)>,
 }
 
 impl Marked {
@@ -50,29 +53,49 @@ impl Marked {
             indexed().filter(|(_, info)| info.alias != 0).map(|(at, info)| (info.alias, at)).collect();
         let mut identifications: Vec<(u16, usize)> =
             indexed().filter_map(|(at, info)| Some((info.identification?, at))).collect();
+        let words = |(at, info): (usize, &&SubDeviceInfo)| {
+            info.data_words.iter().map(move |word| ((word.register, word.value), at)).collect::<Vec<_>>()
+        };
+        let mut data_words: Vec<((RegisterAddress, u16), usize)> = indexed().flat_map(words).collect();
         aliases.put_in_order();
         identifications.put_in_order();
-        Marked { aliases, identifications }
+        data_words.put_in_order();
+        Marked { aliases, identifications, data_words }
     }
 
-    /// The only SubDevice with the alias or identification of an address; the first of the segment for alias 0.
+    /// The only SubDevice with the alias, identification or data word of an address; the first one for alias 0.
     pub(super) fn find(&self, address: ConfigAddress, infos: &[&SubDeviceInfo]) -> Result<Option<usize>, ConfigError> {
         let (marks, mark) = match address {
             ConfigAddress::Alias { alias: 0, .. } => return Ok((!infos.is_empty()).then_some(0)),
             ConfigAddress::Alias { alias, .. } => (&self.aliases, alias),
             ConfigAddress::Identification { value, .. } => (&self.identifications, value),
+            ConfigAddress::DataWord { register, value, .. } => {
+                let key = (register, value);
+                let first = self.data_words.partition_point(|(other, _)| *other < key);
+                let mut marked = self.data_words[first..].iter().take_while(|(other, _)| *other == key);
+                return only(address, infos, marked.next().map(|it| it.1), marked.next().map(|it| it.1));
+            }
             ConfigAddress::Position(_) => return Ok(None),
         };
         let first = marks.partition_point(|(other, _)| *other < mark);
         let mut marked = marks[first..].iter().take_while(|(other, _)| *other == mark).map(|(_, at)| *at);
-        let found = marked.next();
-        step();
-        match (found, marked.next()) {
-            (Some(first), Some(second)) => {
-                let [first, second] = [first, second].map(|at| infos[at].position);
-                Err(ConfigError::Ambiguous { address, first, second })
-            }
-            (first, _) => Ok(first),
+        only(address, infos, marked.next(), marked.next())
+    }
+}
+
+/// The first SubDevice with a mark, unless there is a second one.
+fn only(
+    address: ConfigAddress,
+    infos: &[&SubDeviceInfo],
+    first: Option<usize>,
+    second: Option<usize>,
+) -> Result<Option<usize>, ConfigError> {
+    step();
+    match (first, second) {
+        (Some(first), Some(second)) => {
+            let [first, second] = [first, second].map(|at| infos[at].position);
+            Err(ConfigError::Ambiguous { address, first, second })
         }
+        (first, _) => Ok(first),
     }
 }

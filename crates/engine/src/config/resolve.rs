@@ -124,7 +124,7 @@ fn by_position(configs: &[SubDeviceConfig]) -> Vec<(usize, usize)> {
         .filter(|(_, config)| config.group.is_none())
         .filter_map(|(index, config)| match config.address {
             ConfigAddress::Position(position) => Some((usize::from(position), index)),
-            ConfigAddress::Alias { .. } | ConfigAddress::Identification { .. } => None,
+            ConfigAddress::Alias { .. } | ConfigAddress::Identification { .. } | ConfigAddress::DataWord { .. } => None,
         })
         .collect();
     found.put_in_order();

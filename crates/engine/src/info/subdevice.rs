@@ -4,7 +4,7 @@ use alloc::rc::Rc;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use ringcat_wire::address::{Position, StationAddress};
+use ringcat_wire::address::{Position, RegisterAddress, StationAddress};
 use ringcat_wire::register::{DlStatus, Features, Information, PortKind};
 use ringcat_wire::sii::{
     CoeDetails, DcMode, FmmuUsage, GeneralFlags, Identity, MailboxLayout, MailboxProtocols, SiiSyncManager,
@@ -126,6 +126,8 @@ pub struct SubDeviceInfo {
     pub identity: Identity,
     /// Explicit device identification, as set at its switches; `None` if it has none (protocol 5.3, 4.3).
     pub identification: Option<u16>,
+    /// The words of its memory by which a declaration finds SubDevices and that it has, as read last.
+    pub data_words: Vec<DataWord>,
     /// The controller.
     pub controller: ControllerInfo,
     /// The controller copies AL control into AL status (device emulation): there is no application, and no acknowledge
@@ -174,6 +176,23 @@ pub struct SubDeviceInfo {
     pub warnings: Vec<InfoWarning>,
 }
 
+/// A word of the memory of a SubDevice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct DataWord {
+    /// Physical address.
+    pub register: RegisterAddress,
+    /// Value.
+    pub value: u16,
+}
+
+impl DataWord {
+    /// A word with this value.
+    pub const fn new(register: RegisterAddress, value: u16) -> DataWord {
+        DataWord { register, value }
+    }
+}
+
 /// Numbers of the SyncManagers of both mailboxes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
@@ -185,6 +204,11 @@ pub struct MailboxSyncManagers {
 }
 
 impl SubDeviceInfo {
+    /// The value of a data word, if it was read.
+    pub fn data_word(&self, register: RegisterAddress) -> Option<u16> {
+        self.data_words.iter().find(|word| word.register == register).map(|word| word.value)
+    }
+
     /// Whether the EEPROM was never written or cannot be read: nothing is known about the SubDevice.
     pub fn is_blank(&self) -> bool {
         self.warnings.iter().any(|it| matches!(it.problem, SiiProblem::Blank | SiiProblem::Unreadable))

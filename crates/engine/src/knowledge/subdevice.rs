@@ -3,7 +3,7 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use ringcat_wire::address::{Position, StationAddress};
+use ringcat_wire::address::{Position, RegisterAddress, StationAddress};
 use ringcat_wire::register::{DlStatus, Information, PortDescriptor};
 use ringcat_wire::sii::{
     CategoryKind, CoeDetails, DcMode, FmmuUsage, GeneralFlags, Identity, MailboxLayout, MailboxProtocols,
@@ -14,10 +14,12 @@ use super::code::{Code, Input, by_number, choice, fields};
 use super::error::KnowledgeError;
 use crate::direction::Direction;
 use crate::info::{
-    ControllerInfo, InfoWarning, PdoEntryInfo, PdoInfo, PdoSource, SiiExtent, SiiProblem, SubDeviceInfo, is_possible,
+    ControllerInfo, DataWord, InfoWarning, PdoEntryInfo, PdoInfo, PdoSource, SiiExtent, SiiProblem, SubDeviceInfo,
+    is_possible,
 };
 
 by_number!(Position, u16, |position| position.0, Position);
+by_number!(RegisterAddress, u16, |register| register.0, RegisterAddress);
 by_number!(StationAddress, u16, |station| station.0, StationAddress);
 by_number!(DlStatus, u16, |status| status.bits(), DlStatus::from_bits);
 by_number!(CategoryKind, u16, |kind| kind.code(), CategoryKind::from_code);
@@ -32,6 +34,7 @@ by_number!(SiiSyncManager, [u8; SiiSyncManager::LEN], SiiSyncManager::encode, |b
 by_number!(ControllerInfo, [u8; Information::LEN], controller, |bytes| Information::decode(&bytes).into());
 
 fields!(Identity { vendor_id: u32, product_code: u32, revision: u32, serial: u32 });
+fields!(DataWord { register: RegisterAddress, value: u16 });
 fields!(PdoEntryInfo { index: u16, sub_index: u8, bit_length: u8, data_type: u8, name: String });
 fields!(PdoInfo {
     index: u16,
@@ -116,6 +119,7 @@ plain! {
     alias: u16,
     identity: Identity,
     identification: Option<u16>,
+    data_words: Vec<DataWord>,
     controller: ControllerInfo,
     device_emulation: bool,
     dl_status: DlStatus,

@@ -5,7 +5,7 @@
 use alloc::rc::Rc;
 use alloc::vec::Vec;
 
-use ringcat_wire::address::StationAddress;
+use ringcat_wire::address::{RegisterAddress, StationAddress};
 
 use super::MainDevice;
 use super::activate_error::ActivateError;
@@ -15,10 +15,11 @@ use super::loaded::{Loaded, closing};
 use super::memories::Memories;
 use super::pending::Pending;
 use super::prepare::check;
-use crate::config::{Resolution, resolve};
+use crate::config::{Resolution, data_words, resolve};
 use crate::domain::DomainId;
 use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionError};
+use crate::procedures::data_words::read_of_scan;
 use crate::procedures::idle::{are_ports_as_scanned, without_watch};
 use crate::procedures::junction::{Reached, Refuted, refute};
 use crate::procedures::loops::restore_for_application;
@@ -62,7 +63,16 @@ impl MainDevice {
         Ok(())
     }
 
-    /// Before the last step, if connections were added: tests whether the rings close as declared. This takes some
+    /// Reads words of the memory of each SubDevice of the last scan: those by which declared ones are found
+    /// ([`ConfigAddress::DataWord`](crate::config::ConfigAddress)). The result is what is known of the SubDevices then.
+    pub fn start_data_words(&mut self, words: Vec<RegisterAddress>) -> Pending<Vec<SubDeviceInfo>> {
+        let (bus, segment) = (self.supervisor.bus(), self.segment.clone());
+        let own = bus.clone();
+        Pending::start(&own, async move { read_of_scan(&bus, &segment, &words).await })
+    }
+
+    /// Before the last step. If SubDevices are declared by data words, it reads these. If connections were added, it
+    /// tests whether the rings close as declared. This takes some
     /// frames, and up to some seconds if no frame returns meanwhile. A ring whose closing cable is open at both ends,
     /// or whose SubDevices are not all present, is accepted without a test. Errors that [`MainDevice::apply`] detects
     /// are not checked here.
@@ -74,10 +84,17 @@ impl MainDevice {
     pub fn start_connection_check(&mut self) -> Pending<Result<(), JunctionError>> {
         let bus = self.supervisor.bus();
         let is_permitted = self.active().is_none() && self.permit(Function::Activate).is_ok();
-        let loaded = self.loaded.clone().filter(|loaded| is_permitted && !loaded.connections.is_empty());
+        let loaded = self.loaded.clone().filter(|_| is_permitted);
         let (own, segment) = (bus.clone(), self.segment.clone());
         Pending::start(&own, async move {
             let Some(loaded) = loaded else { return Ok(()) };
+            let words = data_words(&loaded.declaration.subdevices);
+            if !words.is_empty() {
+                read_of_scan(&bus, &segment, &words).await;
+            }
+            if loaded.connections.is_empty() {
+                return Ok(());
+            }
             let (testing, of) = (bus.clone(), segment.clone());
             let test = async move {
                 // Positions and addresses are those of the scan that is valid after idle operation has ended its work.

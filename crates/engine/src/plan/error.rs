@@ -248,6 +248,25 @@ pub enum PlanWarning {
     },
     /// A configuration file has no mailboxes, but the SII has some: the mailboxes of the SII are used.
     MailboxOfSii,
+    /// A configuration file has a mailbox at another place or of another length than the SII. It is written as in the
+    /// file.
+    OtherMailbox {
+        /// The SyncManager.
+        sync_manager: u8,
+        /// Start and length in the file.
+        declared: (u16, u16),
+        /// Start and length in the SII.
+        sii: (u16, u16),
+    },
+    /// A configuration file has process data at another address than the SII. It is written as in the file.
+    OtherAddress {
+        /// The SyncManager.
+        sync_manager: u8,
+        /// Start in the file.
+        declared: u16,
+        /// Start in the SII.
+        sii: u16,
+    },
 }
 
 impl fmt::Display for PlanError {
@@ -380,6 +399,17 @@ impl fmt::Display for PlanWarning {
             }
             PlanWarning::MailboxOfSii => {
                 f.write_str("the file has no mailboxes, but the SubDevice has some: the mailboxes of its SII are used")
+            }
+            PlanWarning::OtherMailbox { sync_manager, declared: (start, length), sii } => {
+                write!(
+                    f,
+                    "SM {sync_manager}: the file has a mailbox of {length} bytes at {start:#06x}, the SII one of "
+                )?;
+                write!(f, "{} bytes at {:#06x}: that of the file is used", sii.1, sii.0)
+            }
+            PlanWarning::OtherAddress { sync_manager, declared, sii } => {
+                write!(f, "SM {sync_manager}: the file has process data at {declared:#06x}, the SII at {sii:#06x}: ")?;
+                f.write_str("the address of the file is used")
             }
         }
     }

@@ -16,7 +16,7 @@ use super::sii;
 use crate::event::Notice;
 use crate::info::{SiiExtent, SubDeviceInfo};
 use crate::segment::member::Phase;
-use crate::segment::{Observation, SubDeviceKey};
+use crate::segment::{More, Observation, SubDeviceKey};
 use crate::supervisor::Bus;
 
 /// How long SubDevices are waited for that do not reach their target state, before it reads the others.
@@ -123,7 +123,7 @@ async fn read_one(
     }
     let read = read?;
     if let Some(key) = key {
-        segment.observe(Observation::SiiCompleted { key, read: &read });
+        segment.observe(Observation::MoreRead { key, more: More::Sii(&read) });
     }
     Ok(())
 }

@@ -25,6 +25,7 @@ pub(super) async fn read_again(bus: &Bus, segment: &SharedSegment, (index, attem
             // A boot loader may have brought another dictionary.
             info.pdo_source = PdoSource::Outdated;
             info.keep_dictionary(&known);
+            info.data_words.clone_from(&known.data_words);
             segment.observe_member((index, attempt), MemberFinding::ReadAgain(&info));
         }
         Err(error) => segment.observe_member((index, attempt), MemberFinding::NotReadAgain(error.to_string())),

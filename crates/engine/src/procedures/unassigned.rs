@@ -24,6 +24,7 @@ use self::doubles::restore;
 pub(super) use self::doubles::{Mark, has_identity, mark};
 pub(super) use self::quiet::level;
 use self::rescan::ports_of;
+use super::data_words::read_declared;
 use super::frame_limit;
 use super::scan::{ScanError, read_one};
 use super::shared_segment::SharedSegment;
@@ -119,7 +120,9 @@ async fn read_once(bus: &Bus, segment: &SharedSegment, key: SubDeviceKey) -> Res
     let station = key.station;
     level(bus, station).await?;
     let position = segment.view().unassigned(key).map(|it| it.position);
-    read_one(bus, position.unwrap_or_default(), station, &segment.cache).await
+    let mut info = read_one(bus, position.unwrap_or_default(), station, &segment.cache).await?;
+    info.data_words = read_declared(bus, segment, station).await?;
+    Ok(info)
 }
 
 /// Assigns their addresses to those that are absent members, and reports the others. To be called when it is known of

@@ -34,7 +34,7 @@ use super::words::Words;
 #[cfg(feature = "standby")]
 use crate::board::live::Life;
 use crate::declared::Move;
-use crate::info::SubDeviceInfo;
+use crate::info::{DataWord, SubDeviceInfo};
 use crate::ring::FrameLimit;
 use crate::ring_status::CableErrors;
 use crate::topology::NodeStatus;
@@ -123,6 +123,15 @@ pub enum MemberFinding<'a> {
     Pdos(PdoFinding<'a>),
 }
 
+/// What is read of a SubDevice after its scan.
+#[derive(Clone, Debug)]
+pub enum More<'a> {
+    /// Its whole SII; of some SIIs the scan reads only a part.
+    Sii(&'a SubDeviceInfo),
+    /// Words of its memory by which declarations may find it: those that it has.
+    DataWords(Vec<DataWord>),
+}
+
 /// An observation.
 #[derive(Debug)]
 pub enum Observation<'a> {
@@ -180,13 +189,12 @@ pub enum Observation<'a> {
         /// The SubDevices.
         found: Rc<Found>,
     },
-    /// The whole SII of a scanned SubDevice was read; of some SIIs the scan read only a part. It is refused if another
-    /// SubDevice has got the address since.
-    SiiCompleted {
+    /// More was read of a scanned SubDevice. It is refused if another SubDevice has got the address since.
+    MoreRead {
         /// The SubDevice at the request.
         key: SubDeviceKey,
-        /// Its data.
-        read: &'a SubDeviceInfo,
+        /// What was read.
+        more: More<'a>,
     },
     /// A finding of the comparison of a declaration with the scan. There is no wait between both and this.
     Compared(DeclarationFinding),

@@ -1,14 +1,14 @@
-//! Networks from a network file: the functions of `ringcat.h`.
+//! Networks from a network file or an ENI: the functions of `ringcat.h`.
 
-use std::ffi::{c_char, c_int, c_uint};
+use std::ffi::{c_char, c_int, c_uint, c_void};
 use std::ptr::null_mut;
 use std::sync::Arc;
 
 use super::handle::{alive, call};
-use super::memory::{put, text};
+use super::memory::{bytes, put, text};
 use super::objects::{MasterObject, Owner, ec_domain_t, ec_master_t, ec_slave_config_t};
 use crate::code::{Code, Outcome};
-use crate::network;
+use crate::network::{Network, Source};
 
 /// `ringcat_variable_t`.
 #[repr(C)]
@@ -20,19 +20,60 @@ pub struct RingcatVariable {
     is_output: c_int,
 }
 
-#[unsafe(no_mangle)]
-unsafe extern "C" fn ringcat_master_load_network(master: *mut ec_master_t, path: *const c_char) -> c_int {
+/// Declares the network that `read` returns.
+///
+/// # Safety
+/// A handle of the library.
+unsafe fn load(master: *mut ec_master_t, read: impl FnOnce() -> Outcome<Network>) -> c_int {
     let load = |MasterObject(owner): &MasterObject| {
-        // SAFETY: a text or NULL (ringcat.h).
-        let path = unsafe { text(path) }?;
         owner.master.check_reserved()?;
         if owner.master.is_active() {
             return Err(Code::BUSY);
         }
-        owner.load(&network::load(&path)?)
+        owner.load(&read()?)
     };
-    // SAFETY: a handle of the library (ecrt.h).
+    // SAFETY: the caller's promise.
     unsafe { call(master, load) }
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn ringcat_master_load_network(master: *mut ec_master_t, path: *const c_char) -> c_int {
+    // SAFETY: a handle of the library, a text or NULL (ringcat.h).
+    unsafe { load(master, || Network::of_file(Source::Path(&text(path)?))) }
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn ringcat_master_load_network_data(
+    master: *mut ec_master_t,
+    data: *const c_void,
+    size: usize,
+) -> c_int {
+    // SAFETY: a handle of the library, memory of this size or NULL (ringcat.h).
+    unsafe { load(master, || Network::of_file(Source::Memory(contents(data, size)?))) }
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn ringcat_master_load_eni(master: *mut ec_master_t, path: *const c_char) -> c_int {
+    // SAFETY: a handle of the library, a text or NULL (ringcat.h).
+    unsafe { load(master, || Network::of_eni(Source::Path(&text(path)?))) }
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn ringcat_master_load_eni_data(master: *mut ec_master_t, data: *const c_void, size: usize) -> c_int {
+    // SAFETY: a handle of the library, memory of this size or NULL (ringcat.h).
+    unsafe { load(master, || Network::of_eni(Source::Memory(contents(data, size)?))) }
+}
+
+/// A file in memory; NULL is none, also without a byte.
+///
+/// # Safety
+/// Memory of this size, or NULL.
+unsafe fn contents<'a>(data: *const c_void, size: usize) -> Outcome<&'a [u8]> {
+    if data.is_null() {
+        return Err(Code::FAULT);
+    }
+    // SAFETY: the caller's promise.
+    unsafe { bytes(data.cast(), size) }
 }
 
 /// A handle by its name in the file; NULL if there is none.

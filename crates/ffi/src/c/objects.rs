@@ -2,7 +2,6 @@
 
 use std::sync::{Arc, Mutex};
 
-use ringcat::network::LoadedNetwork;
 use ringcat::{DomainId, EmergencyRing, RegisterRequest, SdoRequest, SoeRequest, SubDeviceId, VoeHandler};
 
 use super::handle::{Ending, Handle, Kind, bury, ending, give};
@@ -11,6 +10,7 @@ use crate::code::{Code, Outcome};
 use crate::domain_words::DomainWords;
 use crate::locks::locked;
 use crate::master::Master;
+use crate::network::Network;
 use crate::request::Requested;
 use crate::settings::Name;
 
@@ -102,7 +102,7 @@ impl Owner {
     ///
     /// # Errors
     /// The application is active, something is declared already, or the file does not fit the bus.
-    pub fn load(self: &Arc<Owner>, file: &LoadedNetwork) -> Outcome {
+    pub fn load(self: &Arc<Owner>, file: &Network) -> Outcome {
         self.master.load(file)?;
         let domains = self.master.look(|draft| draft.domains().to_vec())?;
         let handles = (0..).zip(domains).map(|(number, words)| {

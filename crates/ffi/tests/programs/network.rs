@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use ringcat::config::ExportOptions;
 use ringcat::network::{NetworkFile, ScanOptions};
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{MainDevice, Options};
@@ -64,4 +65,21 @@ fn a_network_that_does_not_fit_the_links_is_refused() {
     let (said, reported, status) = outputs(&example, &segment, &[network.to_str().expect("a path"), "10"]);
     assert!(!status.success(), "{said}");
     assert!(reported.contains("declares a ring: it needs a redundant interface"), "{reported}");
+}
+
+// covers: c-interface, network-file, eni-run
+#[test]
+fn an_eni_by_path_and_both_files_from_memory_bring_a_segment_to_op() {
+    let Some(checks) = program(&here().join("tests/c/eni.c"), &[]) else { return };
+    let [segment, network, _] = files("eni");
+    let file = NetworkFile::read("eni.toml", &std::fs::read(&network).expect("it is there")).expect("it is valid");
+    let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let eni = network.with_extension("xml");
+    std::fs::write(&eni, export.text).expect("a file");
+    let arguments = [&eni, &network].map(|path| path.to_str().expect("a path"));
+    let (said, reported, status) = outputs(&checks, &segment, &arguments);
+    assert!(status.success(), "{said}\n{reported}");
+    for reason in ["no such file: cannot be read: ", "ENI in memory: ", "network file in memory:"] {
+        assert!(reported.contains(reason), "{reason}: {reported}");
+    }
 }

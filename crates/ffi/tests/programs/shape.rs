@@ -33,9 +33,10 @@ fn both_libraries_export_the_103_functions_and_libethercat_those_of_ringcat_h() 
         let library = library.with_file_name(name);
         let mut wanted = wanted.clone();
         if name == "libethercat.so.1" {
-            let added = ["domain", "load_network", "subdevice", "variable"];
-            let version = || "RINGCAT_1".to_owned();
-            wanted.extend(added.map(|name| (format!("ringcat_master_{name}"), version())));
+            let first = ["domain", "load_network", "subdevice", "variable"].map(|name| (name, "RINGCAT_1"));
+            let second = ["load_eni", "load_eni_data", "load_network_data"].map(|name| (name, "RINGCAT_2"));
+            let added = first.into_iter().chain(second);
+            wanted.extend(added.map(|(name, version)| (format!("ringcat_master_{name}"), version.to_owned())));
         }
         assert_eq!(exported(&library), wanted, "{name}");
         let headers = run(Command::new("readelf").arg("-d").arg(library));

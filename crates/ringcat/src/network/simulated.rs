@@ -56,7 +56,7 @@ impl LoadedNetwork {
             .map_err(|error| SimulatedNetworkError::Contradiction(Box::new(error)))?;
         let own = &self.configuration.declaration.subdevices;
         for (made, own) in file.configuration.declaration.subdevices.iter_mut().zip(own) {
-            // By these it is found: alias, identification.
+            // By these it is found: alias, identification, data word.
             made.address = own.address;
             made.expected.identification = own.expected.identification;
         }
@@ -71,6 +71,7 @@ fn devices(file: &NetworkFile) -> NetworkFile {
     for (index, subdevice) in (0..).zip(&mut devices.subdevice) {
         subdevice.position = Some(index);
         (subdevice.alias, subdevice.identification, subdevice.offset) = (None, None, None);
+        subdevice.identification_word = None;
         (subdevice.group, subdevice.check_identification) = (None, None);
         (subdevice.optional, subdevice.target) = (false, Target::Op);
         subdevice.check_revision = CheckRevision::None;

@@ -5,6 +5,7 @@ mod cables;
 mod commands;
 mod exported;
 mod numbers;
+mod on_wire;
 mod variants;
 
 use std::path::{Path, PathBuf};
@@ -80,7 +81,9 @@ fn activate_on(network: Network, file: EniFile, split_lrw: bool) -> Result<Plant
 /// Activates a file on a network with any SubDevices.
 fn start(network: Network, file: EniFile, split_lrw: bool) -> Result<Plant, Error> {
     let mut main_device = MainDevice::request(SimulatedSegment::new(network), &Options::default());
-    let found = main_device.scan()?.subdevices;
+    let mut scan = main_device.scan()?;
+    main_device.read_data_words(&file.configuration.declaration.subdevices, &mut scan);
+    let found = scan.subdevices;
     let mut application = main_device.activate(file.declaration(split_lrw))?;
     let image = EniImage::new(&file.configuration, application.directory()).expect("the image fits");
     application.set_copies(image.copies()).expect("copies fit");

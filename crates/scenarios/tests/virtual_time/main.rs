@@ -25,6 +25,7 @@ mod configuration;
 mod copies;
 mod crossed_rings;
 mod cycle_parts;
+mod data_words;
 mod deactivate;
 mod declared_sync_managers;
 mod determinism;

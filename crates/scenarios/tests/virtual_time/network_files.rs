@@ -8,6 +8,7 @@ use ringcat::eni::EniImage;
 use ringcat::network::{LoadedNetwork, NetworkFile, ScanOptions};
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{MainDevice, Options, Scan};
+use ringcat_wire::al::{AlState, AlStatus};
 
 const LIMIT: Duration = Duration::from_secs(30);
 const PERIOD: Duration = Duration::from_millis(1);
@@ -118,7 +119,7 @@ fn other_contents_of_a_subdevice_are_named_by_their_kind() {
 // covers: network-file
 #[test]
 fn a_network_file_of_100_subdevices_takes_less_than_2_s_beyond_the_scan() {
-    let (_, scan) = scanned(&segment(40, 56));
+    let (main_device, scan) = scanned(&segment(40, 56));
     assert_eq!(scan.subdevices.len(), 100);
     let begin = Instant::now();
     let text = text_of(&scan);
@@ -127,6 +128,11 @@ fn a_network_file_of_100_subdevices_takes_less_than_2_s_beyond_the_scan() {
     println!("network file of 100 SubDevices, {} bytes: written and read in {took:?}", text.len());
     assert!(took < Duration::from_secs(2), "{took:?}");
     assert_eq!(network.file.to_text(), text);
+    // It runs.
+    let mut application = main_device.activate(network.declaration()).expect("the network is the one of the file");
+    application.wait_until_op(LIMIT).expect("all SubDevices reach OP");
+    let devices = application.links().network().devices();
+    assert!(devices.into_iter().all(|device| device.al_status() == AlStatus::new(AlState::Op)));
 }
 
 /// Evaluated by the outputs of the simulated terminals.

@@ -164,6 +164,7 @@ impl Application {
             (_, AlState::Init) => {
                 self.process_data.stop(now);
                 self.mailbox = None;
+                controller.set_data_word();
                 if description.forgets_pdos_in_init {
                     self.dictionary.forget_pdos(description);
                 }

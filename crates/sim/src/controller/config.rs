@@ -53,6 +53,8 @@ pub struct ControllerConfig {
     /// that arrived there before the latching frame reaches the processing unit, or of the next frame if none has
     /// arrived yet (protocol 7.1).
     pub latches_any_frame: bool,
+    /// A word of the memory that holds a value from power-on: address and value.
+    pub data_word: Option<(u16, u16)>,
 }
 
 impl Default for ControllerConfig {
@@ -76,6 +78,7 @@ impl Default for ControllerConfig {
             clock_start: 0,
             receive_time_latch_mode: false,
             latches_any_frame: false,
+            data_word: None,
         }
     }
 }

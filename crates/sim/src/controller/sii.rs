@@ -236,8 +236,16 @@ impl Controller {
             }
         }
         self.memory.process_ram_open = valid.is_some();
+        self.set_data_word();
         self.compiled.forget();
         self.refresh_dl_status();
+    }
+
+    /// The application sets its word of the memory, once the memory exists.
+    pub fn set_data_word(&mut self) {
+        if let Some((address, value)) = self.config.data_word.filter(|_| self.memory.process_ram_open) {
+            self.memory.store(address.into(), &value.to_le_bytes());
+        }
     }
 }
 

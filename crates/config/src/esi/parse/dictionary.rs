@@ -1,10 +1,17 @@
 //! Object dictionaries (protocol ES-20 to ES-24, ES-72 to ES-74).
 
+use std::collections::hash_map::Entry;
+use std::collections::{HashMap, HashSet};
+
 use super::pdo::slot_index;
 use crate::esi::element::Element;
 use crate::esi::error::{EsiError, EsiProblem};
 use crate::esi::limits::MAX_ELEMENTS;
-use crate::esi::model::{Access, ArrayBounds, DataType, Dictionary, Flags, Object, ObjectInfo, SubItem, SubItemInfo};
+use crate::esi::model::{
+    Access, ArrayBounds, DataType, Dictionary, Flags, Object, ObjectInfo, SlotIndex, SubItem, SubItemInfo,
+};
+use crate::esi::sii::code_of;
+use crate::xml::shown;
 
 /// All states with a mailbox: PREOP, SAFEOP, OP.
 const ALL_STATES: u8 = 7;
@@ -19,9 +26,50 @@ pub(super) fn dictionary(element: Element<'_>) -> Result<Dictionary, EsiError> {
         element.note(format!("DataType \"{}\": the one of line {} counts", pair[0].name, pair[0].line));
     }
     data_types.dedup_by(|later, first| later.name == first.name);
-    let objects = element.child("Objects").into_iter().flat_map(|objects| objects.children("Object"));
-    let objects = objects.map(object).collect::<Result<_, _>>()?;
-    Ok(Dictionary { line: element.line(), file: None, data_types, objects })
+    let mut objects: Vec<Object> = Vec::new();
+    let mut lines: HashMap<SlotIndex, u32> = HashMap::new();
+    for of in element.child("Objects").into_iter().flat_map(|objects| objects.children("Object")) {
+        let object = object(of)?;
+        match lines.entry(object.index) {
+            Entry::Occupied(first) => {
+                let (index, line) = (object.index.index, first.get());
+                of.note(format!("Object {index:#06x} of line {line} is there already: not used"));
+            }
+            Entry::Vacant(place) => {
+                place.insert(object.line);
+                objects.push(object);
+            }
+        }
+    }
+    let dictionary = Dictionary { line: element.line(), file: None, data_types, objects };
+    note_types(element, &dictionary);
+    Ok(dictionary)
+}
+
+/// Notes types that nothing describes, each once, and subindices that a type has twice (protocol ES-20).
+fn note_types(element: Element<'_>, dictionary: &Dictionary) {
+    let mut unknown: HashSet<&str> = HashSet::new();
+    let look_up = |line: u32, name: &str, is_new: bool| {
+        let is_known = name.is_empty() || code_of(name).is_some() || dictionary.data_type(name).is_some();
+        if !is_known && is_new {
+            element.note_at(line, format!("the type {} is not described: the size counts", shown(name)));
+        }
+    };
+    for object in &dictionary.objects {
+        look_up(object.line, &object.data_type, unknown.insert(&object.data_type));
+    }
+    for of in &dictionary.data_types {
+        let names = of.sub_items.iter().map(|item| item.data_type.as_str()).chain(of.base.as_deref());
+        for name in names {
+            look_up(of.line, name, unknown.insert(name));
+        }
+        let mut known = HashSet::new();
+        let twice = of.sub_items.iter().filter_map(|item| item.sub_index).find(|number| !known.insert(*number));
+        if let Some(number) = twice {
+            let text = format!("DataType {}: SubIdx {number} is there twice, the first counts", shown(&of.name));
+            element.note_at(of.line, text);
+        }
+    }
 }
 
 fn data_type(element: Element<'_>) -> Result<DataType, EsiError> {
@@ -127,7 +175,7 @@ fn access_rights(element: Element<'_>) -> Access {
         "wo" => Access { read: 0, write },
         "ro" => Access { read, write: 0 },
         other => {
-            element.note(format!("Access {}: taken as ro", crate::xml::shown(other)));
+            element.note(format!("Access {}: taken as ro", shown(other)));
             Access { read, write: 0 }
         }
     }

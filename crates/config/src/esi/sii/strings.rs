@@ -66,6 +66,8 @@ mod tests {
     // covers: ES-86, ES-88, ES-177
     #[test]
     fn strings_are_latin_1_and_shared() {
+        let mut one = Strings::new(true);
+        assert_eq!((one.add("A"), &one.bytes()[..]), (1, &[1, 1, 0x41][..]));
         let mut strings = Strings::new(true);
         assert!(strings.bytes().is_empty());
         assert_eq!([strings.add("AB"), strings.add(""), strings.add("10 \u{b5}s"), strings.add("AB")], [1, 0, 2, 1]);

@@ -13,10 +13,13 @@ pub(super) fn fit(segment: &Segment, it: UnassignedView<'_>, index: usize) -> Fi
     let mark_fits = match member.config.address {
         // One that was here before is known by its identity, wherever positions are counted from meanwhile.
         ConfigAddress::Alias { alias: 0, offset } => member.info.is_some() || it.position.0 == offset,
-        address @ (ConfigAddress::Alias { offset: 0, .. } | ConfigAddress::Identification { offset: 0, .. }) => {
-            address.is_mark_of(info)
-        }
-        ConfigAddress::Alias { .. } | ConfigAddress::Identification { .. } | ConfigAddress::Position(_) => true,
+        address @ (ConfigAddress::Alias { offset: 0, .. }
+        | ConfigAddress::Identification { offset: 0, .. }
+        | ConfigAddress::DataWord { offset: 0, .. }) => address.is_mark_of(info),
+        ConfigAddress::Alias { .. }
+        | ConfigAddress::Identification { .. }
+        | ConfigAddress::DataWord { .. }
+        | ConfigAddress::Position(_) => true,
     };
     if !mark_fits || member.config.expected.mismatch(info).is_some() {
         return Fit::No;

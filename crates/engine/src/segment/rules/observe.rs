@@ -57,7 +57,7 @@ impl Segment {
             Deactivated => self.deactivate(effects),
             #[cfg(feature = "standby")]
             Standby(seen) => self.observe_standby(seen, effects),
-            SiiCompleted { key, read } => self.observe_whole_sii(key, read, effects),
+            MoreRead { key, more } => self.observe_more(key, more, effects),
             Started => self.start_all(effects),
             OfMember { index, attempt, finding } => self.observe_finding((index, attempt), finding, now, effects),
             Proven { index, mapping } => self.observe_proof(index, mapping),

@@ -4,11 +4,11 @@ use alloc::rc::Rc;
 use alloc::string::{String, ToString};
 
 use crate::event::Event;
-use crate::info::SubDeviceInfo;
 use crate::segment::effect::{Effect, Effects, Task, Watch};
 use crate::segment::idle::{Comparison, Work};
 use crate::segment::key::SubDeviceKey;
 use crate::segment::model::{Declared, Segment};
+use crate::segment::observation::More;
 use crate::segment::scan::{Found, Scan};
 use crate::segment::stage::{Scanned, Stage};
 use crate::segment::start::Start;
@@ -69,14 +69,9 @@ impl Segment {
         }
     }
 
-    /// The whole SII of a scanned SubDevice was read. The list of SubDevices shares its data with the scan, unless
-    /// there is other data since then.
-    pub(in crate::segment) fn observe_whole_sii(
-        &mut self,
-        key: SubDeviceKey,
-        read: &SubDeviceInfo,
-        effects: &mut Effects,
-    ) {
+    /// More was read of a scanned SubDevice. The list of SubDevices shares its data with the scan, unless there is
+    /// other data since then.
+    pub(in crate::segment) fn observe_more(&mut self, key: SubDeviceKey, more: More<'_>, effects: &mut Effects) {
         if self.subdevices.at(key.station).is_none_or(|it| it.key != key) {
             return;
         }
@@ -84,8 +79,13 @@ impl Segment {
         let found = Rc::make_mut(&mut scanned.found);
         let Some(known) = found.subdevices.iter_mut().find(|info| info.station == key.station) else { return };
         let mut info = (**known).clone();
-        for warning in info.extend(read) {
-            effects.report(Event::SiiOddity { position: info.position, what: warning.to_string() });
+        match more {
+            More::Sii(read) => {
+                for warning in info.extend(read) {
+                    effects.report(Event::SiiOddity { position: info.position, what: warning.to_string() });
+                }
+            }
+            More::DataWords(words) => info.data_words = words,
         }
         let before = core::mem::replace(known, Rc::new(info));
         self.subdevices.replace(&before, known);

@@ -165,7 +165,7 @@ fn names_that_were_read_of_a_subdevice_are_not_stored_for_the_next_at_its_addres
         (key, 0, true),
     ];
     for (key, serial, is_stored) in cases {
-        ring.observe(Observation::SiiCompleted { key, read: &whole(serial) });
+        ring.observe(Observation::MoreRead { key, more: More::Sii(&whole(serial)) });
         let named = ring.segment.found().unwrap().subdevices[0].name == "a name";
         assert_eq!(named, is_stored, "{key:?}, serial {serial}");
     }

@@ -43,7 +43,7 @@ fn place(address: ConfigAddress) -> (u16, u16) {
         ConfigAddress::Position(position) => (0, position),
         ConfigAddress::Alias { alias, offset } => (alias, offset),
         // It has no alias: its position is reported where it is found.
-        ConfigAddress::Identification { offset, .. } => (0, offset),
+        ConfigAddress::Identification { offset, .. } | ConfigAddress::DataWord { offset, .. } => (0, offset),
         _ => (0, 0),
     }
 }

@@ -52,6 +52,7 @@ pub(super) fn describe(subdevice: &SubDevice, config: &SubDeviceConfig) -> Devic
     match config.address {
         ConfigAddress::Alias { alias, offset: 0 } => device.alias = alias,
         ConfigAddress::Identification { value, offset: 0 } => device.identification = Some(value),
+        ConfigAddress::DataWord { register, value, offset: 0 } => device.data_word = Some((register.0, value)),
         _ => {}
     }
     device.identification = expected.identification.or(device.identification);

@@ -12,10 +12,10 @@ use ringcat_wire::mailbox::sdo::SdoRequest;
 use super::{DRIVE, EniFile, MACHINE, Plant, activate};
 
 /// User memory of a controller.
-const USER: RegisterAddress = RegisterAddress(0x0F80);
+pub(super) const USER: RegisterAddress = RegisterAddress(0x0F80);
 
 /// The machine with commands in front of those of the drive, of its dictionary, of its other protocols, of the bus.
-fn with(registers: &str, objects: &str, protocols: &str, bus: &str) -> EniFile {
+pub(super) fn with(registers: &str, objects: &str, protocols: &str, bus: &str) -> EniFile {
     let text = String::from_utf8(MACHINE.to_vec()).expect("it is text");
     let insert = |text: &str, from: usize, mark: &str, new: &str| {
         let at = from + text[from..].find(mark).unwrap_or_else(|| panic!("{mark}")) + mark.len();
@@ -34,7 +34,7 @@ fn transitions(names: &[&str]) -> String {
     names.iter().map(|name| format!("<Transition>{name}</Transition>")).collect()
 }
 
-fn register(names: &[&str], code: u8, data: &str) -> String {
+pub(super) fn register(names: &[&str], code: u8, data: &str) -> String {
     let (at, adp) = (transitions(names), if code == 8 { 0 } else { 1005 });
     format!(
         "<InitCmd>{at}<Comment>user memory</Comment><Cmd>{code}</Cmd><Adp>{adp}</Adp><Ado>{}</Ado><Data>{data}</Data>\
@@ -49,11 +49,11 @@ fn object(names: &[&str], value: u8) -> String {
     format!("<InitCmd>{at}<Comment>mode</Comment><Ccs>1</Ccs><Index>24672</Index><Data>{value:02x}</Data></InitCmd>")
 }
 
-fn user(plant: &Plant, index: usize) -> [u8; 2] {
+pub(super) fn user(plant: &Plant, index: usize) -> [u8; 2] {
     *plant.device(index).controller.register(USER, 2).first_chunk().expect("two bytes")
 }
 
-fn served(plant: &Plant, protocol: Protocol) -> Vec<(AlState, Vec<u8>)> {
+pub(super) fn served(plant: &Plant, protocol: Protocol) -> Vec<(AlState, Vec<u8>)> {
     let served = plant.device(DRIVE).application.served_mail().iter().filter(|mail| mail.protocol == protocol);
     served.map(|mail| (mail.state, mail.payload.clone())).collect()
 }
@@ -67,11 +67,11 @@ fn modes(plant: &Plant) -> Vec<(AlState, u8)> {
     plant.device(DRIVE).application.served_mail().iter().filter_map(mode).collect()
 }
 
-fn record(plant: &mut Plant) {
+pub(super) fn record(plant: &mut Plant) {
     plant.network_mut().device_mut(DeviceIndex(DRIVE)).application.record_mail();
 }
 
-fn go(plant: &mut Plant, state: AlState) {
+pub(super) fn go(plant: &mut Plant, state: AlState) {
     let mut work = plant.application.engine_mut().start_state_request(SubDeviceId(DRIVE), state);
     let result = loop {
         match work.take() {
@@ -174,5 +174,6 @@ fn a_group_of_a_file_is_found_by_a_data_word() {
     let file = EniFile::from_bytes(text.as_bytes()).unwrap_or_else(|error| panic!("{error}"));
     let mut plant = activate(file, false, false).expect("it fits");
     plant.settle();
-    assert_eq!(plant.found[DRIVE].identification, Some(7));
+    assert_eq!(plant.found[DRIVE].identification, None, "its EEPROM names no word");
+    assert_eq!(plant.found[DRIVE].data_word(RegisterAddress(4096)), Some(7));
 }

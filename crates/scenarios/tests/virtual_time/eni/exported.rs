@@ -10,7 +10,7 @@ use ringcat::config::{DifferenceKind, Export, ExportDetails, ExportOptions, Foun
 use ringcat::eni::EniFile;
 use ringcat::network::{NetworkFile, ScanOptions};
 use ringcat::simulated::SimulatedSegment;
-use ringcat::{Application, Event, MainDevice, Options, SyncSignals};
+use ringcat::{Application, Event, MainDevice, Options, SyncManagerRole, SyncSignals};
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
 use ringcat_wire::al::AlState;
@@ -142,4 +142,45 @@ fn an_eni_without_mailboxes_reaches_op_with_those_of_the_eeproms() {
         application.cycle(|_| ());
     }
     assert_eq!(states(&application), 6, "all of them accept PREOP");
+}
+
+/// The device needs others, or takes them: the file counts, and one event names the difference.
+// covers: eni-run
+#[test]
+fn each_place_of_an_eni_that_is_not_that_of_the_sii_is_named_once() {
+    let export = scanned().to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let named = |file: EniFile, wanted: &str| {
+        let mut application = start(network(BUS), file, false).expect("it is activated").application;
+        let mut found = Vec::new();
+        // The SubDevice is configured several times.
+        for _ in 0..3_000 {
+            application.cycle(|_| ());
+            while let Some(event) = application.pop_event() {
+                match event.event {
+                    Event::PlanOddity { what, .. } if what.contains(wanted) => found.push(what),
+                    _ => {}
+                }
+            }
+        }
+        found
+    };
+    assert_eq!(named(read(&export), "the file has"), Vec::<String>::new());
+    let mut file = read(&export);
+    let drive = file
+        .configuration
+        .declaration
+        .subdevices
+        .iter_mut()
+        .find(|it| it.declared.iter().flatten().any(|sm| sm.role == SyncManagerRole::MailboxIn));
+    let declared = drive.expect("a drive").declared.as_mut().expect("it declares SyncManagers");
+    for sm in declared {
+        match sm.role {
+            SyncManagerRole::MailboxIn => sm.register.length -= 2,
+            SyncManagerRole::Inputs => sm.register.start += 0x40,
+            _ => {}
+        }
+    }
+    let found = named(file, "the file has");
+    assert_eq!(found.len(), 2, "{found:?}");
+    assert!(found[0].contains("has a mailbox of") && found[1].contains("has process data at"), "{found:?}");
 }
