@@ -15,8 +15,8 @@ use crate::failure::Failure;
 use crate::modules::{self, Failed};
 use crate::output::{counted, warn};
 
-/// Language of the names: English.
-pub const LANGUAGE: u32 = 1033;
+/// Language of the names where none is chosen: English.
+const ENGLISH: u32 = 1033;
 /// Positions without a description that a warning lists.
 const LISTED: usize = 8;
 
@@ -29,6 +29,12 @@ pub struct EsiArgument {
     /// A name of the device or of the file of a network counts before that of a description. See docs/esi.md.
     #[arg(long, value_name = "DIR|FILE.xml")]
     esi: Option<PathBuf>,
+    /// Language of the names of descriptions: 1033 English, 1031 German
+    ///
+    /// A name that a description does not have in it is that of the same language in another country, the English or
+    /// the first.
+    #[arg(long, value_name = "LCID", requires = "esi", help_heading = "Output")]
+    language: Option<u32>,
 }
 
 impl EsiArgument {
@@ -42,7 +48,8 @@ impl EsiArgument {
         if let Some(reason) = refused.filter(|_| !path.is_dir()) {
             return Err(Failure::new(reason.to_owned()));
         }
-        Ok(Some(Descriptions { folder, loaded: Vec::new() }))
+        let language = self.language.unwrap_or(ENGLISH);
+        Ok(Some(Descriptions { folder, loaded: Vec::new(), language }))
     }
 }
 
@@ -123,6 +130,8 @@ fn found_and_described(
 pub struct Descriptions {
     folder: EsiFolder,
     loaded: Vec<(String, Rc<Esi>)>,
+    /// Of their names.
+    pub language: u32,
 }
 
 /// The description of a SubDevice.
@@ -186,9 +195,10 @@ impl Descriptions {
 
     /// Fills in the names of SubDevices whose EEPROM has none.
     pub fn name_subdevices(&mut self, found: &mut [SubDeviceInfo]) {
+        let language = self.language;
         for info in found.iter_mut().filter(|info| info.name.trim().is_empty()) {
             if let Ok(Some(described)) = self.of(info) {
-                name(info, described.device());
+                name(info, described.device(), language);
             }
         }
     }
@@ -212,7 +222,7 @@ impl Descriptions {
                         Some((_, shared)) => shared.clone(),
                         None => {
                             let mut shared = ObjectNames::default();
-                            shared.add_described(described.device(), &modules, LANGUAGE);
+                            shared.add_described(described.device(), &modules, self.language);
                             shared.add_modules(&described.esi.modules);
                             let shared = Arc::new(shared);
                             known.push((kind, shared.clone()));
@@ -237,8 +247,8 @@ fn own(info: &SubDeviceInfo) -> ObjectNames {
 }
 
 /// Names a SubDevice that has no name: the name of the description, and its type where there is no order code.
-fn name(info: &mut SubDeviceInfo, device: &Device) {
-    let texts = [device.name.english(), device.kind.as_str()].map(str::trim);
+fn name(info: &mut SubDeviceInfo, device: &Device, language: u32) {
+    let texts = [device.name.in_language(language), device.kind.as_str()].map(str::trim);
     info.name = texts.into_iter().find(|text| !text.is_empty()).unwrap_or_default().to_owned();
     if info.order_code.trim().is_empty() {
         device.kind.trim().clone_into(&mut info.order_code);

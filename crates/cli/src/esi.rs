@@ -36,7 +36,7 @@ enum EsiCommand {
     /// of its revision or the next older one of the same variant.
     List(ListArguments),
     /// Shows a device of a description, and what can be chosen for it
-    Show(device::DeviceArguments),
+    Show(show::ShowArguments),
     /// Writes a network file with a device of a description and choices
     ///
     /// The choices are checked against the rules of the description.

@@ -1,5 +1,6 @@
 //! `ringcat esi show`: one device of a description, and what can be chosen for it.
 
+use clap::Args;
 use ringcat::config::esi::{Device, Esi, Pdo, Slot, SyncManagerRole};
 
 use super::device::{DeviceArguments, read};
@@ -9,11 +10,21 @@ use crate::json::esi::{EsiShow, ShownMode, ShownPdo, ShownSlot, ShownSyncManager
 use crate::output::{counted, say};
 use crate::verdict::{Report, Verdict};
 
+/// Options of `ringcat esi show`.
+#[derive(Args, Debug)]
+pub struct ShowArguments {
+    #[command(flatten)]
+    device: DeviceArguments,
+    /// Language of names: 1033 English, 1031 German
+    #[arg(long, value_name = "LCID", default_value_t = 1033, help_heading = "Output")]
+    language: u32,
+}
+
 /// Prints a device.
-pub fn run(arguments: &DeviceArguments) -> Result<Report, Failure> {
-    let esi = read(&arguments.esi)?;
-    let device = arguments.choose(&esi)?;
-    let data = shown(&esi, device);
+pub fn run(arguments: &ShowArguments) -> Result<Report, Failure> {
+    let esi = read(&arguments.device.esi)?;
+    let device = arguments.device.choose(&esi)?;
+    let data = shown(&esi, device, arguments.language);
     lines(&data).iter().for_each(|line| say!("{line}"));
     let held = format!(
         "{} revision {:#010x}, {}, {}",
@@ -25,7 +36,7 @@ pub fn run(arguments: &DeviceArguments) -> Result<Report, Failure> {
     Ok(Report { verdict: Verdict::Held(held), data: Data::EsiShow(data) })
 }
 
-fn shown(esi: &Esi, device: &Device) -> EsiShow {
+fn shown(esi: &Esi, device: &Device, language: u32) -> EsiShow {
     let role = |role: SyncManagerRole| match role {
         SyncManagerRole::MailboxOut => "mailbox out",
         SyncManagerRole::MailboxIn => "mailbox in",
@@ -40,14 +51,14 @@ fn shown(esi: &Esi, device: &Device) -> EsiShow {
         is_virtual: sm.is_virtual,
         op_only: sm.op_only,
     });
-    let rx = device.rx_pdos.iter().map(|pdo| shown_pdo(pdo, true));
-    let pdos = rx.chain(device.tx_pdos.iter().map(|pdo| shown_pdo(pdo, false))).collect();
+    let rx = device.rx_pdos.iter().map(|pdo| shown_pdo(pdo, true, language));
+    let pdos = rx.chain(device.tx_pdos.iter().map(|pdo| shown_pdo(pdo, false, language))).collect();
     let modes = device.clock.iter().flat_map(|clock| &clock.modes).map(|mode| ShownMode {
         name: mode.name.trim().to_owned(),
         description: mode.description.trim().to_owned(),
         assign_activate: mode.assign_activate,
     });
-    let slots = device.slots.iter().flat_map(|slots| &slots.slots).map(|slot| shown_slot(esi, slot));
+    let slots = device.slots.iter().flat_map(|slots| &slots.slots).map(|slot| shown_slot(esi, slot, language));
     let dictionaries = device.profiles.iter().filter_map(|profile| profile.dictionary.as_deref());
     let mailbox = device.mailbox.as_ref();
     let protocols = [
@@ -62,7 +73,7 @@ fn shown(esi: &Esi, device: &Device) -> EsiShow {
         esi: esi.file.clone(),
         line: device.line,
         device: device.kind.trim().to_owned(),
-        name: device.name.english().trim().to_owned(),
+        name: device.name.in_language(language).trim().to_owned(),
         vendor_id: device.vendor_id,
         product_code: device.product_code,
         revision: device.revision,
@@ -78,10 +89,10 @@ fn shown(esi: &Esi, device: &Device) -> EsiShow {
     }
 }
 
-fn shown_pdo(pdo: &Pdo, outputs: bool) -> ShownPdo {
+fn shown_pdo(pdo: &Pdo, outputs: bool, language: u32) -> ShownPdo {
     ShownPdo {
         index: pdo.index.index,
-        name: pdo.name.english().trim().to_owned(),
+        name: pdo.name.in_language(language).trim().to_owned(),
         is_output: outputs,
         bits: pdo.bit_length(),
         sync_manager: pdo.sync_manager,
@@ -93,14 +104,14 @@ fn shown_pdo(pdo: &Pdo, outputs: bool) -> ShownPdo {
     }
 }
 
-fn shown_slot(esi: &Esi, slot: &Slot) -> ShownSlot {
+fn shown_slot(esi: &Esi, slot: &Slot, language: u32) -> ShownSlot {
     let by_class = |class: Option<&str>| slot.classes.iter().any(|it| Some(it.class.as_str()) == class);
     let fits = esi
         .modules
         .iter()
         .filter(|module| slot.modules.iter().any(|it| it.ident == module.ident) || by_class(module.class.as_deref()));
     ShownSlot {
-        name: slot.name.english().trim().to_owned(),
+        name: slot.name.in_language(language).trim().to_owned(),
         least: slot.least,
         most: slot.most,
         modules: fits.map(|module| module.kind.trim().to_owned()).collect(),

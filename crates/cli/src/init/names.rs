@@ -5,7 +5,7 @@ use std::fmt;
 use ringcat::network::NetworkFile;
 
 use crate::bus::Bus;
-use crate::descriptions::{Descriptions, LANGUAGE};
+use crate::descriptions::Descriptions;
 use crate::failure::Failure;
 use crate::output::{counted, warn};
 
@@ -49,7 +49,7 @@ pub fn fill(file: &mut NetworkFile, bus: &Bus, descriptions: &mut Descriptions) 
             warn(format!("position {position} \"{name}\": {difference} ({path}): the device has priority"));
         }
         named.modules += modules.len();
-        named.names += subdevice.name_from_esi(described.device(), &modules, LANGUAGE);
+        named.names += subdevice.name_from_esi(described.device(), &modules, descriptions.language);
     }
     Ok(named)
 }

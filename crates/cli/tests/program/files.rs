@@ -144,6 +144,19 @@ fn names_that_a_device_does_not_have_come_from_its_description() {
     }
     let same = ringcat(&["compare", "--sim", &bus, "--network", &out]);
     assert_eq!(same.code, Some(0), "names are no difference: {}", same.all());
+    let translated = "<Name LcId=\"1033\">AI Channel 2</Name><Name LcId=\"1031\">AE Kanal 2</Name>";
+    place.write("esi/acme.xml", &described.replacen("<Name>AI Channel 2</Name>", translated, 1));
+    for (language, expected) in [("1031", "AE Kanal 2"), ("3079", "AE Kanal 2"), ("1033", "AI Channel 2")] {
+        let esi = place.path("esi");
+        let in_it = init(&["--esi", &esi, "--language", language]);
+        let made = place.read("machine.toml");
+        assert!(in_it.code == Some(0) && made.contains(expected), "{language}: {}{made}", in_it.all());
+        let file = format!("{esi}/acme.xml");
+        let shown = ringcat(&["esi", "show", &file, "--type", "AA02", "--language", language]);
+        assert!(shown.code == Some(0) && shown.out.contains(expected), "{language}: {}", shown.all());
+    }
+    let alone = init(&["--language", "1031"]);
+    assert!(alone.code == Some(2) && alone.errors.contains("--esi"), "{}", alone.all());
     let gone = init(&["--esi", &place.path("no-such")]);
     assert!(gone.code == Some(2) && gone.verdict().contains("no-such"), "{}", gone.all());
 }
