@@ -123,7 +123,8 @@ impl Draft {
         for sync_manager in network::sync_managers(config, found.as_ref(), wanted) {
             let placed = self.declaration.register_sync_manager(domain, subdevice, sync_manager, found.as_ref());
             let area = placed.map_err(refusal)?;
-            areas.push(Area { subdevice: subdevice.0, sync_manager, domain, start: area.start });
+            let (direction, start, length) = (area.direction, area.start, area.length.into());
+            areas.push(Area { subdevice: subdevice.0, sync_manager, domain, direction, start, length });
         }
         Ok(())
     }

@@ -213,6 +213,9 @@ impl Master {
         if self.is_active() {
             return Err(Code::BUSY);
         }
+        // By these words the bus tells which SubDevice is which.
+        let words = self.bus()?.supervisor().learn_data_words(file.declared());
+        words.map_err(|_| Code::GONE)?;
         self.refresh()?;
         let is_ring = self.responder()?.overview()?.is_ring;
         if file.is_ring && !is_ring {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::path::Path;
 
-use ringcat::config::{Configuration, Variable};
+use ringcat::config::{Configuration, ImageArea, Variable};
 use ringcat::eni::EniFile;
 use ringcat::network::LoadedNetwork;
 use ringcat::{ConfigAddress, Declaration, Direction, DomainId, SubDeviceConfig, SubDeviceInfo};
@@ -46,8 +46,12 @@ pub struct Area {
     pub sync_manager: u8,
     /// The domain.
     pub domain: DomainId,
+    /// Its direction.
+    pub direction: Direction,
     /// First byte in the image of the domain.
     pub start: u32,
+    /// Bytes.
+    pub length: u32,
 }
 
 /// Where the text of a network is.
@@ -98,6 +102,13 @@ impl Network {
         };
         let domains = (0..configuration.declaration.domains.len()).map(|number| number.to_string()).collect();
         Ok(Network { configuration, domains, is_ring: false })
+    }
+}
+
+impl Network {
+    /// The declared SubDevices.
+    pub fn declared(&self) -> &[SubDeviceConfig] {
+        &self.configuration.declaration.subdevices
     }
 }
 
@@ -161,24 +172,75 @@ pub fn names(configuration: &Configuration, domains: &[String], areas: &[Area]) 
         subdevices: subdevices.map(|(index, facts)| (facts.name.clone(), index)).collect(),
         domains: domains.map(|(number, name)| (name.clone(), DomainId(number))).collect(),
         variables: variables
-            .filter_map(|variable| Some((variable.name.clone(), place(configuration, areas, variable)?)))
+            .filter_map(|variable| Some((variable.name.clone(), place(&configuration.image.areas, areas, variable)?)))
             .collect(),
     }
 }
 
-fn place(configuration: &Configuration, areas: &[Area], variable: &Variable) -> Option<Place> {
-    let mut of_image = configuration.image.areas.iter();
-    let within = of_image.find(|area| {
-        let bits = area.image_bit..area.image_bit + area.bits;
-        area.direction == variable.direction && bits.contains(&variable.image_bit)
+/// The place of a variable; `None` if its process data is not exchanged, or is not of one SyncManager.
+fn place(image: &[ImageArea], areas: &[Area], variable: &Variable) -> Option<Place> {
+    let within = image.iter().find(|area| {
+        let first = variable.image_bit.checked_sub(area.image_bit);
+        let last = first.and_then(|first| first.checked_add(variable.bits));
+        area.direction == variable.direction && last.is_some_and(|last| last <= area.bits)
     })?;
-    let area = areas
-        .iter()
-        .find(|area| (area.subdevice, Some(area.sync_manager)) == (within.subdevice, within.sync_manager))?;
+    // All process data of a direction is one sequence where the file names no SyncManagers.
+    let mut first = within.bit_offset.checked_add(variable.image_bit - within.image_bit)?;
+    let is_of = |area: &&Area| (area.subdevice, area.direction) == (within.subdevice, within.direction);
+    let mut of_subdevice: Vec<&Area> = areas.iter().filter(is_of).collect();
+    of_subdevice.sort_by_key(|area| area.sync_manager);
+    let area = match within.sync_manager {
+        Some(sync_manager) => of_subdevice.into_iter().find(|area| area.sync_manager == sync_manager)?,
+        None => of_subdevice.into_iter().find(|area| {
+            let bits = area.length.saturating_mul(8);
+            let is_here = first < bits;
+            first -= if is_here { 0 } else { bits };
+            is_here
+        })?,
+    };
+    if first.checked_add(variable.bits)? > area.length.checked_mul(8)? {
+        return None;
+    }
     Some(Place {
         domain: area.domain,
-        bit: area.start * 8 + within.bit_offset + (variable.image_bit - within.image_bit),
+        bit: area.start.checked_mul(8)?.checked_add(first)?,
         bits: variable.bits,
         is_output: variable.direction == Direction::Outputs,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two SyncManagers of one SubDevice with 2 and 1 bytes of inputs, 100 bytes apart in the domain.
+    fn areas() -> [Area; 2] {
+        let (subdevice, domain, direction) = (0, DomainId(0), Direction::Inputs);
+        let area = |sync_manager, start, length| Area { subdevice, sync_manager, domain, direction, start, length };
+        [area(4, 100, 1), area(3, 0, 2)]
+    }
+
+    fn image(sync_manager: Option<u8>, bit_offset: u32, image_bit: u32, bits: u32) -> ImageArea {
+        ImageArea { subdevice: 0, direction: Direction::Inputs, sync_manager, bit_offset, image_bit, bits }
+    }
+
+    fn bit_of(image: &[ImageArea], image_bit: u32, bits: u32) -> Option<u32> {
+        let (name, data_type, direction) = (String::new(), String::new(), Direction::Inputs);
+        let variable = Variable { name, data_type, direction, image_bit, bits, subdevice: Some(0) };
+        place(image, &areas(), &variable).map(|place| place.bit)
+    }
+
+    // covers: c-interface, eni
+    #[test]
+    fn a_variable_has_a_place_if_it_is_within_one_sync_manager() {
+        let named = [image(Some(3), 0, 0, 16), image(Some(4), 0, 16, 8)];
+        assert_eq!((bit_of(&named, 3, 13), bit_of(&named, 16, 8)), (Some(3), Some(800)));
+        assert_eq!((bit_of(&named, 3, 14), bit_of(&named, 20, 5), bit_of(&named, 3, u32::MAX)), (None, None, None));
+        // The file names more bits than the SyncManager has.
+        assert_eq!(bit_of(&[image(Some(4), 0, 0, 64)], 0, 64), None);
+        // All process data as one sequence, from bit 4 on.
+        let one = [image(None, 4, 0, 20)];
+        assert_eq!((bit_of(&one, 0, 12), bit_of(&one, 12, 8), bit_of(&one, 14, 2)), (Some(4), Some(800), Some(802)));
+        assert_eq!((bit_of(&one, 8, 8), bit_of(&one, 20, 1)), (None, None));
+    }
 }

@@ -236,6 +236,18 @@ impl SupervisorThread {
         self.finish_scan(|| ())
     }
 
+    /// Reads the data words by which declared SubDevices are found; [`SupervisorThread::subdevices`] has them then.
+    ///
+    /// # Errors
+    /// [`Error::Gone`]: the thread has ended.
+    pub fn learn_data_words(&self, declared: &[SubDeviceConfig]) -> Result<(), Error> {
+        let words = data_words(declared);
+        if !words.is_empty() {
+            self.start_work(move |engine| engine.start_data_words(words)).wait()?;
+        }
+        Ok(())
+    }
+
     /// As [`crate::MainDevice::read_data_words`].
     ///
     /// # Errors

@@ -24,8 +24,8 @@ pub struct ClientId(u32);
 pub struct ClientEvents {
     /// The events, oldest first, with the numbers that all clients see.
     pub events: Vec<TimedEvent>,
-    /// Number of events that did not fit: they were older than these. Events that were lost before they had a subject
-    /// are counted as well.
+    /// Number of events that did not fit. Events that the cyclic half could not keep are counted as well, whatever
+    /// their subject.
     pub missed: u64,
 }
 

@@ -373,7 +373,8 @@ impl Clocks {
         self.wanted_epoch = epoch;
         board.clocks.times.post_wanted(epoch, shift);
         let time = application.wrapping_sub(shift);
-        let own = self.times[leader.index()].filter(|own| now.0.saturating_sub(own.sent_at.0) <= OLD_NS).or(self.led);
+        let read = self.times[leader.index()];
+        let own = read.filter(|own| now.0.saturating_sub(own.sent_at.0) <= OLD_NS).or(self.led).or(read);
         let is_far = own.is_some_and(|own| is_far(own.at(now).wrapping_sub(time) as i64));
         if is_far && !self.is_far {
             board.clocks.times.wake_supervisor();

@@ -219,19 +219,22 @@ impl SubDeviceInfo {
         self.warnings.iter().any(|warning| warning.problem.is_grave())
     }
 
-    /// Takes over the PDOs that were read before from the object dictionary of a SubDevice with this identity. It may
-    /// hold others now, unless they are those of power-on and a serial number shows that it is the same one: another
-    /// one may have other modules, or other parameters in its memory.
+    /// Takes over the PDOs that were read before from the object dictionary of a SubDevice of this type. It may hold
+    /// others now, unless they are those of power-on and a serial number shows that it is the same one: another one may
+    /// have other modules, or other parameters in its memory. What is not certain is compared when it is configured.
     pub(crate) fn keep_dictionary(&mut self, known: &SubDeviceInfo) {
-        let kind = |it: &SubDeviceInfo| Identity { serial: 0, ..it.identity };
+        let kind = |it: &SubDeviceInfo| (it.identity.vendor_id, it.identity.product_code);
         let is_read = self.pdo_source.is_of_dictionary();
-        if is_read || !known.pdo_source.is_of_dictionary() || kind(self) != kind(known) {
+        if is_read || known.pdo_source == PdoSource::Sii || kind(self) != kind(known) {
             return;
         }
         self.pdos.clone_from(&known.pdos);
-        let is_of_power_on = self.pdo_source.is_of_power_on() && known.pdo_source.is_of_power_on();
-        let is_the_same = self.identity.serial != 0 && self.identity.serial == known.identity.serial;
-        self.pdo_source = if is_of_power_on && is_the_same { PdoSource::Dictionary } else { PdoSource::Outdated };
+        let is_the_same = self.identity.serial != 0 && self.identity == known.identity;
+        self.pdo_source = match known.pdo_source {
+            PdoSource::Dictionary if self.pdo_source.is_of_power_on() && is_the_same => PdoSource::Dictionary,
+            PdoSource::Dictionary | PdoSource::Written if self.pdo_source.is_of_power_on() => PdoSource::Written,
+            _ => PdoSource::Outdated,
+        };
     }
 
     /// The same SubDevice with other ports, at another position; shared if nothing differs.

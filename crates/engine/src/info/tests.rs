@@ -361,16 +361,30 @@ fn pdos_of_a_dictionary_are_certain_only_with_the_same_serial_number() {
     };
     let read = pdos(0x1A00);
     let known = |serial| info(1, serial, PdoSource::Dictionary, read.clone());
-    for (revision, serial, before, expected, is_kept) in [
-        (1, 5, 5, PdoSource::Dictionary, true),
-        (1, 6, 5, PdoSource::Outdated, true),
-        (1, 0, 0, PdoSource::Outdated, true),
-        (2, 5, 5, PdoSource::Sii, false),
-    ] {
-        let mut found = info(revision, serial, PdoSource::Sii, Vec::new());
+    for (serial, before, expected) in
+        [(5, 5, PdoSource::Dictionary), (6, 5, PdoSource::Written), (0, 0, PdoSource::Written)]
+    {
+        let mut found = info(1, serial, PdoSource::Sii, Vec::new());
         found.keep_dictionary(&known(before));
-        assert_eq!((found.pdo_source, !found.pdos.is_empty()), (expected, is_kept), "{revision}, {serial}, {before}");
+        assert_eq!((found.pdo_source, &found.pdos), (expected, &read), "{serial}, {before}");
+        // It loses its power again before it was configured.
+        let mut again = info(1, serial, PdoSource::Sii, Vec::new());
+        again.keep_dictionary(&found);
+        assert_eq!((again.pdo_source, &again.pdos), (expected, &read), "{serial}, {before} again");
     }
+    // A boot loader may have brought another revision; what was in doubt stays in doubt.
+    for (revision, source) in [(2, PdoSource::Outdated), (1, PdoSource::Outdated)] {
+        let mut found = info(revision, 5, source, Vec::new());
+        found.keep_dictionary(&known(5));
+        assert_eq!((found.pdo_source, &found.pdos), (PdoSource::Outdated, &read));
+    }
+    let mut found = info(1, 5, PdoSource::Sii, Vec::new());
+    found.keep_dictionary(&info(1, 5, PdoSource::Outdated, read.clone()));
+    assert_eq!((found.pdo_source, &found.pdos), (PdoSource::Outdated, &read));
+    let mut other = info(1, 5, PdoSource::Sii, Vec::new());
+    other.identity.product_code = 8;
+    other.keep_dictionary(&known(5));
+    assert_eq!((other.pdo_source, other.pdos.len()), (PdoSource::Sii, 0));
     // What was read of this one counts more.
     let own = pdos(0x1A01);
     let mut found = info(1, 5, PdoSource::Dictionary, own.clone());

@@ -156,7 +156,7 @@ impl MainDevice {
     }
 
     /// Starts to open all ports that were closed to cut SubDevices off, by this application or by one before it. A
-    /// scan opens them as well.
+    /// scan from the beginning opens them as well, a rescan does not.
     pub fn start_open_blocked(&mut self) -> Pending<Result<usize, ServiceError>> {
         let (bus, segment, permitted) = (self.bus(), self.segment.clone(), self.permit(Function::BlockedPorts));
         self.start(async move {

@@ -19,7 +19,7 @@ use crate::config::{Resolution, data_words, resolve};
 use crate::domain::DomainId;
 use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionError};
-use crate::procedures::data_words::read_of_scan;
+use crate::procedures::data_words::{read_of_scan, scanned};
 use crate::procedures::idle::{are_ports_as_scanned, without_watch};
 use crate::procedures::junction::{Reached, Refuted, refute};
 use crate::procedures::loops::restore_for_application;
@@ -68,7 +68,10 @@ impl MainDevice {
     pub fn start_data_words(&mut self, words: Vec<RegisterAddress>) -> Pending<Vec<SubDeviceInfo>> {
         let (bus, segment) = (self.supervisor.bus(), self.segment.clone());
         let own = bus.clone();
-        Pending::start(&own, async move { read_of_scan(&bus, &segment, &words).await })
+        Pending::start(&own, async move {
+            read_of_scan(&bus, &segment, &words).await;
+            scanned(&segment)
+        })
     }
 
     /// Before the last step. If SubDevices are declared by data words, it reads these. If connections were added, it
@@ -89,8 +92,10 @@ impl MainDevice {
         Pending::start(&own, async move {
             let Some(loaded) = loaded else { return Ok(()) };
             let words = data_words(&loaded.declaration.subdevices);
-            if !words.is_empty() {
-                read_of_scan(&bus, &segment, &words).await;
+            let (reading, of) = (bus.clone(), segment.clone());
+            let read = async move { read_of_scan(&reading, &of, &words).await };
+            if without_watch(&bus, &segment, read).await != Some(true) {
+                return Err(JunctionError::NotTested);
             }
             if loaded.connections.is_empty() {
                 return Ok(());

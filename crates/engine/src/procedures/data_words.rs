@@ -15,11 +15,10 @@ use crate::supervisor::{Bus, BusError};
 const ATTEMPTS: u32 = 3;
 
 /// Reads the words of each SubDevice of the scan, for those that find a declaration. A SubDevice without such a memory
-/// has none.
-pub(crate) async fn read_of_scan(bus: &Bus, segment: &SharedSegment, words: &[RegisterAddress]) -> Vec<SubDeviceInfo> {
-    let found = || segment.view().found().map(|found| found.scan().subdevices).unwrap_or_default();
+/// has none. False if frames were lost: words that were read before are kept then.
+pub(crate) async fn read_of_scan(bus: &Bus, segment: &SharedSegment, words: &[RegisterAddress]) -> bool {
     if words.is_empty() {
-        return found();
+        return true;
     }
     let keys: Vec<_> = {
         let view = segment.view();
@@ -30,10 +29,19 @@ pub(crate) async fn read_of_scan(bus: &Bus, segment: &SharedSegment, words: &[Re
         let words = words.to_vec();
         async move { (key, read(&bus, key.station, &words).await) }
     });
+    let mut are_all_read = true;
     for (key, words) in read.await {
-        segment.observe(Observation::MoreRead { key, more: More::DataWords(words.unwrap_or_default()) });
+        match words {
+            Ok(words) => segment.observe(Observation::MoreRead { key, more: More::DataWords(words) }),
+            Err(_) => are_all_read = false,
+        }
     }
-    found()
+    are_all_read
+}
+
+/// What is known of the SubDevices of the scan.
+pub(crate) fn scanned(segment: &SharedSegment) -> Vec<SubDeviceInfo> {
+    segment.view().found().map(|found| found.scan().subdevices).unwrap_or_default()
 }
 
 /// Reads the words that declared SubDevices are found by.

@@ -80,7 +80,7 @@ pub(crate) async fn deactivate(
         // None is known any more that could confirm it.
         return if declared.is_empty() { Ok(()) } else { stopped };
     }
-    if is_settled == Ok(true) {
+    if is_settled == Ok(true) || segment.view().unsettled().is_empty() {
         return Ok(());
     }
     // A refusal is certain before the limit.

@@ -112,8 +112,11 @@ pub(in crate::procedures) async fn start_signals(
 async fn until_time_is_given(bus: &Bus, segment: &SharedSegment) {
     let until = bus.now() + GIVEN_LIMIT;
     let begins_with_it = segment.view().clocks().config.pulse_grid == PulseGrid::FirstApplicationTime;
-    while begins_with_it && segment.board.clocks.times.first().is_none() && bus.now() < until {
+    while begins_with_it && bus.now() < until {
         let posted = bus.posted();
+        if segment.board.clocks.times.first().is_some() {
+            return;
+        }
         segment.until_posted(posted, until, || false).await;
     }
 }
@@ -155,7 +158,8 @@ async fn wait_until_about_right(
         let difference_ns = node.and_then(|node| node.difference_ns);
         let is_near = difference_ns.is_some_and(|ns| ns.unsigned_abs() <= GOOD_ENOUGH_NS);
         let is_right = clocks.are_set_up() && (is_near || node.map(|node| node.station) == clocks.reference);
-        let lack = NotLocked { waited: limit, difference_ns, window_ns: GOOD_ENOUGH_NS, other: None, hidden: None };
+        let hidden = node.and_then(|node| clocks.hidden(node)).filter(|hidden| !hidden.is_estimated);
+        let lack = NotLocked { waited: limit, difference_ns, window_ns: GOOD_ENOUGH_NS, other: None, hidden };
         if is_right { Ok(()) } else { Err(lack) }
     };
     wait(bus, segment, limit, check).await

@@ -67,14 +67,22 @@ pub(crate) async fn block(
     Ok(ports)
 }
 
-/// Opens all ports that were closed to cut SubDevices off; returns their number. If a port cannot be reached now, all
-/// are kept for the next attempt.
+/// Opens all ports that were closed to cut SubDevices off; returns their number. Those that cannot be reached now are
+/// kept for the next attempt.
 pub(crate) async fn open_blocked(bus: &Bus, segment: &SharedSegment) -> Result<usize, ServiceError> {
     let blocked = segment.view().blocked().to_vec();
     segment.observe(Observation::Unblocking);
-    let opened = set_all(bus, segment, &blocked, LoopControl::Auto).await;
+    let mut opened = set_all(bus, segment, &blocked, LoopControl::Auto).await;
     if opened.is_err() {
-        segment.observe(Observation::Blocked(&blocked));
+        opened = Ok(());
+        let mut kept = Vec::new();
+        for port in &blocked {
+            if let Err(error) = set_all(bus, segment, core::slice::from_ref(port), LoopControl::Auto).await {
+                kept.push(*port);
+                opened = Err(error);
+            }
+        }
+        segment.observe(Observation::Blocked(&kept));
     }
     segment.observe(Observation::RoundWanted);
     opened.map(|()| blocked.len())
