@@ -158,7 +158,11 @@ fn other_address(info: &SubDeviceInfo, area: &AreaPlan) -> Option<PlanWarning> {
     let described = info.sync_managers.get(usize::from(sync_manager))?;
     let is_process_data = matches!(described.kind, SyncManagerKind::Outputs | SyncManagerKind::Inputs);
     let (declared, sii) = (area.physical, described.start);
-    (is_process_data && declared != sii).then_some(PlanWarning::OtherAddress { sync_manager, declared, sii })
+    (is_process_data && area.length > 0 && declared != sii).then_some(PlanWarning::OtherAddress {
+        sync_manager,
+        declared,
+        sii,
+    })
 }
 
 fn mailbox_pair(info: &SubDeviceInfo, layout: &MailboxLayout, of: MailboxSyncManagers) -> Vec<SmPlan> {
