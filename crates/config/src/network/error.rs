@@ -89,13 +89,24 @@ pub(super) fn path_text(path: &[Step]) -> String {
     let mut text = String::new();
     for step in path {
         match step {
-            Step::Key(key) if text.is_empty() => text.push_str(key),
+            Step::Key(key) if text.is_empty() => text.push_str(&short(key)),
             Step::Key(key) => {
                 text.push('.');
-                text.push_str(key);
+                text.push_str(&short(key));
             }
             Step::Index(index) => text.push_str(&format!("[{index}]")),
         }
+    }
+    text
+}
+
+/// A name of the file as a message shows it.
+pub(super) fn short(name: &str) -> String {
+    /// Characters that are shown.
+    const SHOWN: usize = 80;
+    let mut text: String = name.chars().take(SHOWN).collect();
+    if name.chars().nth(SHOWN).is_some() {
+        text.push_str("...");
     }
     text
 }

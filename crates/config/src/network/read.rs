@@ -6,7 +6,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::check::check;
-use super::error::{Fault, MAX_NETWORK_BYTES, NetworkError, Step, path_text};
+use super::error::{Fault, MAX_NETWORK_BYTES, NetworkError, Step, path_text, short};
 use super::model::NetworkFile;
 
 /// Maximum bytes of a message of the TOML reader.
@@ -212,7 +212,7 @@ fn subdevice_of(root: &DeTable<'_>, path: &[Step]) -> String {
     let tables = root.get(key.as_str()).filter(|_| key == "subdevice").and_then(|value| value.get_ref().as_array());
     let table = tables.and_then(|tables| tables.get(*index)).and_then(|table| table.get_ref().as_table());
     let name = table.and_then(|table| table.get("name")).and_then(|name| name.get_ref().as_str());
-    name.unwrap_or_default().to_owned()
+    short(name.unwrap_or_default())
 }
 
 fn line_of(text: &str, at: usize) -> usize {
