@@ -126,10 +126,10 @@ impl ClockOptions {
     /// file, master shift or bus shift is an option.
     pub fn adapt(&self, declaration: &mut Declaration, asked: bool) -> Result<(), Failure> {
         if !self.sync.is_empty() || self.reference != ReferenceClock::default() {
-            return Err(Failure::new("--sync and --reference: the ENI has the SYNC signals and the reference clock"));
+            return Err(Failure::new("--sync and --reference: the file has the SYNC signals and the reference clock"));
         }
         let Some(config) = &mut declaration.clocks else {
-            return if asked { Err(Failure::new("the ENI has no distributed clocks")) } else { Ok(()) };
+            return if asked { Err(Failure::new("the file has no distributed clocks")) } else { Ok(()) };
         };
         config.epoch = system_time::epoch(now());
         config.bus_shift = (config.bus_shift || self.bus_shift) && self.phase.is_none();
