@@ -44,7 +44,8 @@ EC_PUBLIC_API int ringcat_master_load_network_data(ec_master_t *master, const vo
  * Declares the network of an ENI. Returns as ringcat_master_load_network().
  *
  * Its domains have their numbers as names, from "0", in the order of the tasks (`Cyclic`) that exchange process data;
- * variables have the names of the file, those that reach past the process data of a SyncManager none. Copies from inputs to outputs (`CopyInfos`) are the program's own.
+ * variables have the names of the file, those that reach past the process data of a SyncManager none. Copies from
+ * inputs to outputs (`CopyInfos`) are the program's own.
  */
 EC_PUBLIC_API int ringcat_master_load_eni(ec_master_t *master, const char *path);
 

@@ -230,7 +230,7 @@ mod tests {
         place(image, &areas(), &variable).map(|place| place.bit)
     }
 
-    // covers: c-interface, eni
+    // covers: c-interface, eni-run
     #[test]
     fn a_variable_has_a_place_if_it_is_within_one_sync_manager() {
         let named = [image(Some(3), 0, 0, 16), image(Some(4), 0, 16, 8)];
