@@ -78,9 +78,8 @@ pub(super) async fn keep_up(
                 Box::pin(frame_limit::explain(bus, segment)).await;
                 segment.observe_member((index, attempt), MemberFinding::Failed(problem(&error)));
             }
-            // A request of another program, or of a procedure that had ended, came between: the SubDevice was not in
-            // the state before the requested one.
-            Err(error) if has_fallen(&error) && !core::mem::replace(&mut disturbed, true) => {
+            // A request of another program, or of a procedure that had ended, came between.
+            Err(error) if was_changed(&error) && !core::mem::replace(&mut disturbed, true) => {
                 bus.sleep(READ_PAUSE).await;
                 continue;
             }
@@ -144,13 +143,15 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
     }
 }
 
-/// The SubDevice has refused a state because it was not in the one before (AL status code 0x0011).
-fn has_fallen(error: &ConfigureError) -> bool {
+/// The SubDevice has refused a state because it was not as this configuration had left it: in another state than the
+/// one before (AL status code 0x0011), or asked for PREOP before its mailboxes were enabled (0x0016).
+fn was_changed(error: &ConfigureError) -> bool {
     let ConfigureError::State(al_state::StateError::Refused { requested, status, code }) = error else { return false };
     let before = match requested {
+        AlState::PreOp => return *code == AlStatusCode::INVALID_MAILBOX_CONFIGURATION_PREOP,
         AlState::SafeOp => AlState::PreOp,
         AlState::Op => AlState::SafeOp,
-        AlState::Init | AlState::PreOp | AlState::Boot => return false,
+        AlState::Init | AlState::Boot => return false,
     };
     let is_between = status.al_state().is_some_and(|state| state == before || state == *requested);
     *code == AlStatusCode::INVALID_STATE_CHANGE && !is_between
