@@ -234,7 +234,9 @@ impl<L: Links> MainDevice<L> {
     /// tested). The error contains the MainDevice; the declaration stays loaded.
     pub fn apply(mut self) -> Result<Application<L>, Box<Refused<MainDevice<L>>>> {
         let window = Arc::new(Window::new(self.acyclic_bytes));
-        let checked = self.check_connections().map_err(ActivateError::Junction);
+        let words = self.engine.start_loaded_data_words();
+        let read = self.finish(words);
+        let checked = read.and_then(|()| self.check_connections().map_err(ActivateError::Junction));
         match checked.and_then(|()| self.engine.apply()) {
             Ok(active) => Ok(Application::new(self.links, Inline::new(self.engine), active, window)),
             Err(error) => Err(Box::new(Refused { error: error.into(), main_device: self })),
@@ -315,10 +317,10 @@ pub fn automatic(subdevices: &[SubDeviceInfo], period: Duration) -> Declaration 
     declaration
 }
 
-/// Takes the data words that were read into the result of a scan.
+/// Takes the data words that were read into the result of a scan; those of another scan belong to other SubDevices.
 pub(crate) fn take_data_words(read: Vec<SubDeviceInfo>, scan: &mut Scan) {
     for (of, read) in scan.subdevices.iter_mut().zip(read) {
-        if of.identity == read.identity {
+        if (of.station, of.identity) == (read.station, read.identity) {
             of.data_words = read.data_words;
         }
     }

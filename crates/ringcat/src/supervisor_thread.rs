@@ -319,7 +319,7 @@ impl SupervisorThread {
             applied
         };
         let apply = || self.act(apply)?.map_err(Error::from);
-        match self.check_connections().and_then(|()| apply()) {
+        match self.read_loaded_data_words().and_then(|()| self.check_connections()).and_then(|()| apply()) {
             Ok(active) => {
                 let (window, published) = (self.0.window.clone(), self.0.published.clone());
                 let application = Application::new(links, self, active, window);
@@ -328,6 +328,11 @@ impl SupervisorThread {
             }
             Err(error) => Err(Box::new(Refused { error, main_device: Ended { supervisor: self, links } })),
         }
+    }
+
+    /// Reads the data words by which loaded SubDevices are declared.
+    fn read_loaded_data_words(&self) -> Result<(), Error> {
+        Ok(self.start_work(|engine| engine.start_loaded_data_words()).wait()??)
     }
 
     /// Checks that the declared rings close as declared.

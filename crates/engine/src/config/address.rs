@@ -29,7 +29,7 @@ pub enum ConfigAddress {
         offset: u16,
     },
     /// `offset` SubDevices behind the one with this value in a word of its memory, which the SII need not name
-    /// (protocol 4.3). The word is read between the scan and the activation (`MainDevice::start_connection_check`).
+    /// (protocol 4.3). The word is read between the scan and the activation (`MainDevice::start_loaded_data_words`).
     DataWord {
         /// Physical address of the word.
         register: RegisterAddress,

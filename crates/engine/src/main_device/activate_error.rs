@@ -43,6 +43,9 @@ pub enum ActivateError {
     Scanning,
     /// There is no loaded declaration to apply.
     NotLoaded,
+    /// Data words by which SubDevices are declared could not be read: frames were lost, or a scan or an application has
+    /// begun meanwhile.
+    DataWords,
     /// A connection of a local ring does not fit.
     Junction(JunctionError),
     /// The declared target state cannot be held with process data and mailbox.
@@ -170,6 +173,10 @@ impl fmt::Display for ActivateError {
             ActivateError::Setup { subdevice, error } => write!(f, "SubDevice {subdevice}: {error}"),
             ActivateError::Scanning => f.write_str("a scan is running"),
             ActivateError::NotLoaded => f.write_str("nothing is loaded: load a declaration before applying it"),
+            ActivateError::DataWords => f.write_str(
+                "the data words by which SubDevices are declared could not be read: frames are lost, or the segment is \
+                 in use",
+            ),
             ActivateError::Junction(error) => error.fmt(f),
             ActivateError::Target { subdevice, target } => {
                 write!(f, "SubDevice {subdevice}: expected target INIT, PREOP, SAFEOP or OP, got {target}")

@@ -74,8 +74,26 @@ impl MainDevice {
         })
     }
 
-    /// Before the last step. If SubDevices are declared by data words, it reads these. If connections were added, it
-    /// tests whether the rings close as declared. This takes some
+    /// Before the last step, if SubDevices are declared by data words
+    /// ([`ConfigAddress::DataWord`](crate::config::ConfigAddress)): reads these words of each SubDevice of the scan.
+    ///
+    /// The result is [`ActivateError::DataWords`] if frames are lost, or if a scan or an application begins meanwhile.
+    pub fn start_loaded_data_words(&mut self) -> Pending<Result<(), ActivateError>> {
+        let (bus, segment) = (self.supervisor.bus(), self.segment.clone());
+        let loaded = self.loaded.as_ref().filter(|_| self.active().is_none());
+        let words = loaded.map(|loaded| data_words(&loaded.declaration.subdevices)).unwrap_or_default();
+        let (own, reading, of) = (bus.clone(), bus.clone(), segment.clone());
+        Pending::start(&own, async move {
+            if words.is_empty() {
+                return Ok(());
+            }
+            let read = async move { read_of_scan(&reading, &of, &words).await };
+            let are_read = without_watch(&bus, &segment, read).await == Some(true);
+            if are_read { Ok(()) } else { Err(ActivateError::DataWords) }
+        })
+    }
+
+    /// Before the last step, if connections were added: tests whether the rings close as declared. This takes some
     /// frames, and up to some seconds if no frame returns meanwhile. A ring whose closing cable is open at both ends,
     /// or whose SubDevices are not all present, is accepted without a test. Errors that [`MainDevice::apply`] detects
     /// are not checked here.
@@ -87,19 +105,10 @@ impl MainDevice {
     pub fn start_connection_check(&mut self) -> Pending<Result<(), JunctionError>> {
         let bus = self.supervisor.bus();
         let is_permitted = self.active().is_none() && self.permit(Function::Activate).is_ok();
-        let loaded = self.loaded.clone().filter(|_| is_permitted);
+        let loaded = self.loaded.clone().filter(|loaded| is_permitted && !loaded.connections.is_empty());
         let (own, segment) = (bus.clone(), self.segment.clone());
         Pending::start(&own, async move {
             let Some(loaded) = loaded else { return Ok(()) };
-            let words = data_words(&loaded.declaration.subdevices);
-            let (reading, of, is_any) = (bus.clone(), segment.clone(), !words.is_empty());
-            let read = async move { read_of_scan(&reading, &of, &words).await };
-            if is_any && without_watch(&bus, &segment, read).await != Some(true) {
-                return Err(JunctionError::NotTested);
-            }
-            if loaded.connections.is_empty() {
-                return Ok(());
-            }
             let (testing, of) = (bus.clone(), segment.clone());
             let test = async move {
                 // Positions and addresses are those of the scan that is valid after idle operation has ended its work.
