@@ -65,37 +65,26 @@ impl Marked {
 
     /// The only SubDevice with the alias, identification or data word of an address; the first one for alias 0.
     pub(super) fn find(&self, address: ConfigAddress, infos: &[&SubDeviceInfo]) -> Result<Option<usize>, ConfigError> {
-        let (marks, mark) = match address {
+        let found = match address {
             ConfigAddress::Alias { alias: 0, .. } => return Ok((!infos.is_empty()).then_some(0)),
-            ConfigAddress::Alias { alias, .. } => (&self.aliases, alias),
-            ConfigAddress::Identification { value, .. } => (&self.identifications, value),
-            ConfigAddress::DataWord { register, value, .. } => {
-                let key = (register, value);
-                let first = self.data_words.partition_point(|(other, _)| *other < key);
-                let mut marked = self.data_words[first..].iter().take_while(|(other, _)| *other == key);
-                return only(address, infos, marked.next().map(|it| it.1), marked.next().map(|it| it.1));
-            }
+            ConfigAddress::Alias { alias, .. } => first_two(&self.aliases, alias),
+            ConfigAddress::Identification { value, .. } => first_two(&self.identifications, value),
+            ConfigAddress::DataWord { register, value, .. } => first_two(&self.data_words, (register, value)),
             ConfigAddress::Position(_) => return Ok(None),
         };
-        let first = marks.partition_point(|(other, _)| *other < mark);
-        let mut marked = marks[first..].iter().take_while(|(other, _)| *other == mark).map(|(_, at)| *at);
-        only(address, infos, marked.next(), marked.next())
+        step();
+        match found {
+            [Some(first), Some(second)] => {
+                let [first, second] = [first, second].map(|at| infos[at].position);
+                Err(ConfigError::Ambiguous { address, first, second })
+            }
+            [first, _] => Ok(first),
+        }
     }
 }
 
-/// The first SubDevice with a mark, unless there is a second one.
-fn only(
-    address: ConfigAddress,
-    infos: &[&SubDeviceInfo],
-    first: Option<usize>,
-    second: Option<usize>,
-) -> Result<Option<usize>, ConfigError> {
-    step();
-    match (first, second) {
-        (Some(first), Some(second)) => {
-            let [first, second] = [first, second].map(|at| infos[at].position);
-            Err(ConfigError::Ambiguous { address, first, second })
-        }
-        (first, _) => Ok(first),
-    }
+/// The first two with a mark, of marks in order.
+fn first_two<M: Ord + Copy>(marks: &[(M, usize)], mark: M) -> [Option<usize>; 2] {
+    let first = marks.partition_point(|(other, _)| *other < mark);
+    [first, first + 1].map(|at| marks.get(at).filter(|(other, _)| *other == mark).map(|(_, at)| *at))
 }
