@@ -186,13 +186,12 @@ fn a_program_that_starts_with_its_daemon_reaches_op() {
     let segment = crate::library::workshop().join("four.toml");
     let device = "[[device]]\ntype = \"digital-output-8\"\n";
     std::fs::write(&segment, format!("[segment]\n{}", device.repeat(4))).expect("it can be written");
-    // A busy machine takes up to 3 s for a round.
     for round in 0..15 {
         let begin = Instant::now();
         let bench = Bench::begin(&segment, "early", Rights::default());
         std::thread::sleep(Duration::from_millis(2 * round));
         let mut command = Command::new("timeout");
-        command.arg("60").arg(&cost).args(["cycles", "1000", "10"]).env("RINGCAT_SOCKET", &bench.socket);
+        command.arg("10").arg(&cost).args(["cycles", "1000", "10"]).env("RINGCAT_SOCKET", &bench.socket);
         let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it runs");
         // It reads a line when all are in OP.
         child.stdin.take().expect("it is piped").write_all(b"go\n").expect("there is room");
