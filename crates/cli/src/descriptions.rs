@@ -16,7 +16,7 @@ use crate::modules::{self, Failed};
 use crate::output::{counted, warn};
 
 /// Language of the names where none is chosen: English.
-const ENGLISH: u32 = 1033;
+pub const ENGLISH: u32 = 1033;
 /// Positions without a description that a warning lists.
 const LISTED: usize = 8;
 

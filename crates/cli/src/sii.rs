@@ -59,7 +59,7 @@ struct BuildArguments {
     #[arg(long, value_enum, default_value = "twincat", help_heading = "Image")]
     profile: Profile,
     /// Language of the strings
-    #[arg(long, value_name = "LCID", default_value_t = 1033, help_heading = "Image")]
+    #[arg(long, value_name = "LCID", default_value_t = crate::descriptions::ENGLISH, help_heading = "Image")]
     language: u32,
     /// Station alias
     #[arg(long, value_name = "ALIAS", value_parser = number_of_16_bits, help_heading = "Image")]

@@ -36,7 +36,7 @@ pub struct ChoiceArguments {
     #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = cycle, help_heading = "Choices")]
     pub cycle: Duration,
     /// Language of names
-    #[arg(long, value_name = "LCID", default_value_t = 1033, help_heading = "Choices")]
+    #[arg(long, value_name = "LCID", default_value_t = crate::descriptions::ENGLISH, help_heading = "Choices")]
     pub language: u32,
 }
 

@@ -16,7 +16,7 @@ pub struct ShowArguments {
     #[command(flatten)]
     device: DeviceArguments,
     /// Language of names: 1033 English, 1031 German
-    #[arg(long, value_name = "LCID", default_value_t = 1033, help_heading = "Output")]
+    #[arg(long, value_name = "LCID", default_value_t = crate::descriptions::ENGLISH, help_heading = "Output")]
     language: u32,
 }
 
