@@ -155,7 +155,7 @@ fn start_cycles(
 fn reasons(clocks: &[ClockStatus], locked: bool, settled: bool) -> Vec<String> {
     let mut reasons = Vec::new();
     if !locked {
-        let count = clocks.iter().filter(|clock| !clock.is_locked && !clock.is_reference).count();
+        let count = clocks.iter().filter(|clock| clock.is_awaited()).count();
         reasons.push(format!("{count} of {} clocks not locked", clocks.len()));
     }
     let window = ClockConfig::default().sync_window_ns;

@@ -324,7 +324,7 @@ impl MainDevice {
         self.segment.view().clocks().status()
     }
 
-    /// Whether all clocks are locked (protocol 7.2).
+    /// Whether all clocks are locked that operation needs ([`ClockStatus::is_required`], protocol 7.2).
     pub fn clocks_locked(&self) -> bool {
         self.segment.view().clocks().are_locked()
     }

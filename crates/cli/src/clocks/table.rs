@@ -36,10 +36,11 @@ pub fn lines(clocks: &[ClockStatus], names: &Names, signals: &[Option<SyncSignal
         "pos  station  delay/ns  drift/ppm   now/ns  worst/ns  locked              offset/ns  name  SYNC/us".to_owned();
     let line = |clock: &ClockStatus| {
         let difference = clock.difference_ns.map_or_else(|| "-".to_owned(), |ns| ns.to_string());
-        let state = match (clock.is_reference, clock.is_locked) {
-            (true, _) => "reference",
-            (false, true) => "yes",
-            (false, false) => "no",
+        let state = match clock {
+            ClockStatus { is_reference: true, .. } => "reference",
+            ClockStatus { is_locked: true, .. } => "yes",
+            ClockStatus { is_required: true, .. } => "no",
+            _ => "not used",
         };
         let words = signals_of(clock, signals).map(|signals| format!("  {}", signals_in_words(&signals)));
         format!(
@@ -73,6 +74,7 @@ pub fn json(
         name: name(clock, names).to_owned(),
         reference: clock.is_reference,
         locked: clock.is_locked,
+        required: clock.is_required,
         delay_ns: is_written(clock).then_some(clock.delay_ns),
         delay_hidden: clock.hidden.map(|hidden| HiddenDelay {
             fork: hidden.fork.map(|fork| fork.0),

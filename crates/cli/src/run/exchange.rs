@@ -143,7 +143,7 @@ impl Run {
             say!("  SubDevice {subdevice} \"{name}\": {state}");
         }
         let clocks = self.cycles.supervisor().clocks().unwrap_or_default();
-        for clock in clocks.iter().filter(|clock| !clock.is_locked && !clock.is_reference) {
+        for clock in clocks.iter().filter(|clock| clock.is_awaited()) {
             let difference = clock.difference_ns.map_or_else(|| "unknown".to_owned(), |ns| format!("{ns} ns"));
             let name = clock.subdevice.and_then(|subdevice| self.log.events().names().0.get(subdevice.0));
             let name = name.map_or_else(String::new, |name| format!(" \"{name}\""));

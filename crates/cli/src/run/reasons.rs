@@ -66,7 +66,7 @@ impl Exchanged {
             Some(RingState::Unknown) => reasons.push("it is unknown whether the ring is closed".to_owned()),
             Some(RingState::Closed) | None => {}
         }
-        let unlocked = self.clocks.iter().filter(|clock| !clock.is_locked && !clock.is_reference).count();
+        let unlocked = self.clocks.iter().filter(|clock| clock.is_awaited()).count();
         if unlocked > 0 {
             reasons.push(format!("{unlocked} of {} clocks not locked", self.clocks.len()));
         }
@@ -154,14 +154,15 @@ mod tests {
     fn subdevices_ring_and_clocks_are_checked_at_the_end() {
         let states = vec![SubDeviceState::Absent, SubDeviceState::Settled(AlState::Op), SubDeviceState::Configuring];
         let mut exchanged = Exchanged { states, all_settled: false, ring: Some(RingState::Open), ..settled() };
-        exchanged.clocks = vec![ClockStatus::default(); 2];
+        exchanged.clocks = vec![ClockStatus::default(); 3];
+        exchanged.clocks[0].is_required = true;
         exchanged.clocks[1].is_reference = true;
         exchanged.incomplete = vec!["domain 0: no SubDevice answers, working counter 0 of 3".to_owned()];
         let expected = [
             "at the end domain 0: no SubDevice answers, working counter 0 of 3",
             "SubDevice 0 \"coupler\" does not answer and 1 more, not in OP",
             "the ring is open",
-            "1 of 2 clocks not locked",
+            "1 of 3 clocks not locked",
         ];
         assert_eq!(reasons(&exchanged), expected);
         let closed = Exchanged { ring: Some(RingState::Closed), ..settled() };

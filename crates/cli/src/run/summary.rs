@@ -43,7 +43,7 @@ pub fn json(
     let (pace, cyclic, cyclic_status) =
         (application.pace(), application.cyclic_counters(), application.cyclic_status());
     let exchanged = &end.exchanged;
-    let locked = exchanged.clocks().iter().all(|clock| clock.is_locked || clock.is_reference);
+    let locked = !exchanged.clocks().iter().any(ClockStatus::is_awaited);
     run::Run {
         cycle_ns: end.cycle.as_nanos() as u64,
         reached_op: end.reached_op,
@@ -143,7 +143,9 @@ pub fn summary(application: &Application<WireLinks, SupervisorThread>, surroundi
 /// Prints how the clocks kept together.
 pub fn clock_account(clocks: &[ClockStatus], cyclic_status: &CyclicStatus, names: &Names) {
     let locked = clocks.iter().filter(|clock| clock.is_locked || clock.is_reference).count();
-    say!("  clocks: {locked} of {} locked", clocks.len());
+    let unused = clocks.iter().filter(|clock| !clock.is_required).count();
+    let unused = if unused > 0 { format!(", {unused} not used") } else { String::new() };
+    say!("  clocks: {locked} of {} locked{unused}", clocks.len());
     if let Some(clock) = farthest(clocks).filter(|_| locked > 0) {
         let name = clock.subdevice.and_then(|subdevice| names.0.get(subdevice.0)).map_or("", String::as_str);
         say!(

@@ -86,7 +86,7 @@ impl NetworkFile {
             ringcat_network: model::VERSION,
             name: options.name.clone(),
             redundancy: Redundancy { ring: options.ring, ..Redundancy::default() },
-            clocks: options.clocks.then(Clocks::default),
+            clocks: options.clocks.then(|| clocks(found, &names)),
             domain: vec![Domain {
                 name: DOMAIN.to_owned(),
                 period: Time(options.period),
@@ -107,6 +107,13 @@ fn names(found: &[SubDeviceInfo]) -> Vec<String> {
         names.unique(own.unwrap_or_else(|| format!("SubDevice {}", info.position)))
     };
     found.iter().map(unique).collect()
+}
+
+/// Clocks with the reference that the engine takes where none is named, the first SubDevice with a clock. An ENI made of
+/// the file names it.
+fn clocks(found: &[SubDeviceInfo], names: &[String]) -> Clocks {
+    let first = found.iter().position(|info| info.controller.features.dc);
+    Clocks { reference: first.map(|index| names[index].clone()), ..Clocks::default() }
 }
 
 /// A text of an EEPROM without control characters and outer blanks.

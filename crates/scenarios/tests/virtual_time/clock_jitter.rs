@@ -3,9 +3,10 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, Options, SyncSignals};
+use ringcat::{Event, Options, ReferenceClock, SubDeviceId, SyncSignals};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::network::{Network, NetworkOptions};
+use ringcat_wire::al::AlState;
 use scenarios::clocks::{clocked, config, spread, watch, with_clocks};
 use scenarios::segments::{line, ring};
 use scenarios::world::{Mark, World};
@@ -80,5 +81,47 @@ fn sync0_stays_synchronous_through_cuts_with_a_host_50_us_late() {
         }
         assert!(window_events(&world, mark) <= 16, "{}", window_events(&world, mark));
         assert_eq!(world.left_op(mark), []);
+    }
+}
+
+/// The sender is on average 200 us late: clocks in front of the reference follow it by its estimate, and do not lock.
+/// Without SYNC signals nothing waits for them, and the others are as exact as ever; with signals they wait themselves.
+// covers: 7.2, 7.3, dc-late-host
+#[test]
+fn a_clock_without_sync_in_front_of_the_reference_holds_nobody_back() {
+    for (count, reference, closed) in [(3, 1, false), (3, 1, true), (12, 1, false), (12, 5, false), (12, 5, true)] {
+        for front_has_sync in [false, true] {
+            let text = format!("reference {reference} of {count}, ring {closed}, SYNC in front {front_has_sync}");
+            let descriptions = clocked(count, 50);
+            let options = NetworkOptions::default();
+            let network = if closed { ring(descriptions, options) } else { line(descriptions, options) };
+            let mut world = World::with(51, network, &Options::default(), |scan| {
+                let chosen = config().with_reference(ReferenceClock::Declared(SubDeviceId(reference)));
+                let mut declaration = with_clocks(scan, chosen);
+                for subdevice in declaration.subdevices.iter_mut().skip(if front_has_sync { 0 } else { reference }) {
+                    subdevice.sync = Some(SyncSignals::sync0(1_000_000, 0));
+                }
+                declaration
+            })
+            .expect("it can be activated");
+            world.application_mut().links_mut().send_late(Duration::from_micros(400));
+            if front_has_sync {
+                world.run_cycles(10_000);
+                assert!(!world.all_in_op(), "{text}: clocks in front locked at this delay");
+                assert_eq!(world.network().device(DeviceIndex(0)).al_status().state, AlState::SafeOp.code(), "{text}");
+                continue;
+            }
+            // 15,000 distributions before the lock, each with such a delay.
+            world.until(Duration::from_secs(15), &text, World::all_in_op);
+            let engine = world.application().engine();
+            assert!(engine.clocks_locked(), "{text}");
+            let required: Vec<bool> = engine.clocks().iter().map(|clock| clock.is_required).collect();
+            assert_eq!(required, (0..count).map(|at| at >= reference).collect::<Vec<_>>(), "{text}");
+            let mark = world.mark();
+            let behind: Vec<usize> = (reference..count).collect();
+            let [apart] = watch(&mut world, [&behind], 3_000);
+            assert!(apart <= 100, "{text}: {apart} ns apart");
+            assert_eq!((window_events(&world, mark), world.left_op(mark)), (0, Vec::new()), "{text}");
+        }
     }
 }

@@ -114,7 +114,7 @@ impl Clocks {
         self.running().is_some()
     }
 
-    /// Whether all clocks have reached the window.
+    /// Whether all clocks that are required have reached the window.
     pub fn are_locked(&self) -> bool {
         self.running().is_some_and(|running| matches!(running.lock, Lock::Locked(_)))
     }
@@ -183,10 +183,17 @@ impl Clocks {
         self.nodes.iter().any(|node| node.has_clock)
     }
 
-    /// Whether a clock that answers is outside its window, or has been inside for too short a time.
+    /// Whether a clock that is required is outside its window, or has been inside for too short a time.
     pub fn is_any_outside(&self) -> bool {
         let samples = self.config.lock_samples;
-        self.nodes.iter().any(|node| node.has_clock && node.link.is_some() && node.good < samples)
+        self.nodes.iter().any(|node| self.is_required(node) && node.good < samples)
+    }
+
+    /// Whether operation needs its lock: it answers, and has SYNC signals or follows the reference. A clock without
+    /// signals in front of the reference receives the host's estimate of the time: it never locks where the host sends
+    /// milliseconds late, and its time moves nothing.
+    pub fn is_required(&self, node: &Node) -> bool {
+        node.has_clock && node.link.is_some() && (node.is_configured || !self.is_in_front(node))
     }
 
     /// Whether all offsets are being changed.
@@ -263,6 +270,7 @@ impl Clocks {
             difference_ns: node.difference_ns,
             worst_ns: node.worst_ns,
             is_locked: node.good >= self.config.lock_samples,
+            is_required: self.is_required(node),
         };
         with_clock.map(status).collect()
     }
@@ -344,12 +352,15 @@ impl Clocks {
 
     /// The reference of a link and the clocks that frames pass before it.
     pub fn in_front_on(&self, link: Link) -> Option<(&Node, Vec<&Node>)> {
-        let reference = self.reference_on(link)?;
-        let is_in_front = |node: &&Node| {
-            let is_used = node.has_clock && !node.is_unset && node.link == Some(link);
-            is_used && node.unit.is_some() && node.unit < reference.unit
-        };
-        Some((reference, self.nodes.iter().filter(is_in_front).collect()))
+        let is_used = |node: &&Node| node.has_clock && !node.is_unset && node.link == Some(link);
+        let in_front = self.nodes.iter().filter(is_used).filter(|node| self.is_in_front(node));
+        Some((self.reference_on(link)?, in_front.collect()))
+    }
+
+    /// Whether frames pass it before the reference of its link.
+    fn is_in_front(&self, node: &Node) -> bool {
+        let reference = node.link.and_then(|link| self.reference_on(link));
+        reference.is_some_and(|reference| node.unit.is_some() && node.unit < reference.unit)
     }
 
     /// Filter depths that differ from the written ones: DC_FILTER_DIFFERENCE and DC_FILTER_SPEED. References and

@@ -33,6 +33,16 @@ pub struct ClockStatus {
     pub worst_ns: u32,
     /// It was within the window for as many samples as configured.
     pub is_locked: bool,
+    /// Operation needs its lock: it has SYNC signals or follows the reference. A clock without SYNC signals in front of
+    /// the reference follows the host's estimate of the time, and nothing waits for it.
+    pub is_required: bool,
+}
+
+impl ClockStatus {
+    /// Whether operation needs its lock and does not have it.
+    pub const fn is_awaited(&self) -> bool {
+        self.is_required && !self.is_locked && !self.is_reference
+    }
 }
 
 /// Why the delay of a SubDevice is unknown (protocol 7.1): it is behind a fork without a clock, and the latched receive

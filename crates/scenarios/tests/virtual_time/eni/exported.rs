@@ -10,7 +10,7 @@ use ringcat::config::{DifferenceKind, Export, ExportDetails, ExportOptions, Foun
 use ringcat::eni::EniFile;
 use ringcat::network::{NetworkFile, ScanOptions};
 use ringcat::simulated::SimulatedSegment;
-use ringcat::{Application, Event, MainDevice, Options, SyncManagerRole, SyncSignals};
+use ringcat::{Application, Event, MainDevice, Options, ReferenceClock, SubDeviceId, SyncManagerRole, SyncSignals};
 use ringcat_sim::network::Network;
 use ringcat_sim::segment::Segment;
 use ringcat_wire::al::AlState;
@@ -96,6 +96,19 @@ fn an_exported_eni_reaches_op_on_the_segment_of_the_eni_it_was_made_of() {
         let [outputs, inputs] = proven(activate_on(network, read(&export), false).expect("its segment"), seed);
         assert!(outputs + inputs > 8, "{outputs} outputs, {inputs} inputs");
     }
+}
+
+/// A network file of a scan names the reference clock, the first clock of the bus, and the ENI has the same.
+// covers: eni-run, dc-reference
+#[test]
+fn the_eni_of_a_scan_has_the_first_clock_as_reference() {
+    let file = scanned();
+    let named = file.clocks.as_ref().and_then(|clocks| clocks.reference.clone());
+    assert_eq!(named, Some(file.subdevice[0].name.clone()));
+    let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    assert!(export.left_out.iter().all(|it| it.what != "clocks"), "{:?}", export.left_out);
+    let clocks = read(&export).configuration.declaration.clocks.expect("it has clocks");
+    assert_eq!(clocks.reference, ReferenceClock::Declared(SubDeviceId(0)));
 }
 
 /// The differences that `ringcat compare --eni` names, and whether they prevent OP.

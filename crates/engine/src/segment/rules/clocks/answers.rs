@@ -11,7 +11,7 @@ use crate::segment::model::Segment;
 use crate::time::Instant;
 
 impl Segment {
-    /// Stores the differences. The lock is reported when all are within the window.
+    /// Stores the differences. The lock is reported when all that are required are within the window.
     pub(super) fn observe_differences(&mut self, answers: &Answers, effects: &mut Effects) {
         let differences = self.differences(answers);
         // While no time is distributed, differences belong to a frame with another path.
@@ -23,9 +23,12 @@ impl Segment {
         let references = Link::ALL.map(|link| self.clocks.reference_on(link).map(|node| node.station));
         let (lock_window_ns, samples) = (self.clocks.config.lock_window_ns, self.clocks.config.lock_samples);
         let (mut all, mut largest) = (self.clocks.reference.is_some(), 0);
-        for (node, (difference, deviation_ppb)) in self.clocks.nodes.iter_mut().zip(differences) {
+        let required: Vec<bool> = self.clocks.nodes.iter().map(|node| self.clocks.is_required(node)).collect();
+        for ((node, (difference, deviation_ppb)), is_required) in
+            self.clocks.nodes.iter_mut().zip(differences).zip(required)
+        {
             let Some(difference) = difference else {
-                all &= !node.has_clock || node.link.is_none();
+                all &= !is_required;
                 continue;
             };
             // Nothing is written to a reference, so its difference is zero.
@@ -39,12 +42,12 @@ impl Segment {
             if is_locked || (node.worst_ns > 0 && are_locked) {
                 node.worst_ns = node.worst_ns.max(magnitude);
             }
-            all &= is_locked;
+            all &= is_locked || !is_required;
             if is_locked && !is_reference {
                 // The deviation compensated by the loop, now that it has settled (protocol 7.2.1).
                 node.drift_ppb = -deviation_ppb;
             }
-            largest = largest.max(magnitude);
+            largest = largest.max(if is_required { magnitude } else { 0 });
         }
         // While a reference is steered, the exchange does not see the differences of the others from their reference.
         let is_steered = references.iter().all(Option::is_some) || self.board.clocks.shows_host_jitter();
