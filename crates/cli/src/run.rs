@@ -76,7 +76,7 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
     let described = complete_by(&supervisor, descriptions.as_mut(), &mut scan.subdevices)?;
     let (names, objects) = names(network.as_ref(), &scan, described);
     let declaration = arguments.declared.declare(network.as_ref(), &scan.subdevices)?;
-    let declaration = arguments.resend.adapt(declaration.with_under_way(arguments.under_way.under_way));
+    let declaration = arguments.resend.adapt(arguments.under_way.adapt(declaration));
     let undeclared = network.as_ref().map_or(0, |network| {
         network.report_cables(&scan);
         network.undeclared(&scan.subdevices)

@@ -1,7 +1,7 @@
 //! The option `--under-way`: cycles whose frames are out at once.
 
 use clap::Args;
-use ringcat::MAX_UNDER_WAY;
+use ringcat::{Declaration, MAX_UNDER_WAY};
 
 use crate::numbers::number;
 
@@ -11,13 +11,17 @@ pub struct UnderWayArgument {
     /// Cycles that may be under way at once
     ///
     /// For a cycle time that is shorter than the way of a frame through segment and host. Inputs are then as many
-    /// cycles old as their way takes.
-    #[arg(
-        long,
-        value_name = "CYCLES",
-        default_value = "1",
-        help_heading = "Cycle",
-        value_parser = number(1..=MAX_UNDER_WAY, 2)
-    )]
-    pub under_way: u8,
+    /// cycles old as their way takes. Without the option it is what a network file says for each domain, otherwise 1.
+    #[arg(long, value_name = "CYCLES", help_heading = "Cycle", value_parser = number(1..=MAX_UNDER_WAY, 2))]
+    pub under_way: Option<u8>,
+}
+
+impl UnderWayArgument {
+    /// The declaration with this choice for all domains, or as it is without a choice.
+    pub fn adapt(self, declaration: Declaration) -> Declaration {
+        match self.under_way {
+            Some(under_way) => declaration.with_under_way(under_way),
+            None => declaration,
+        }
+    }
 }

@@ -83,7 +83,7 @@ pub fn run(arguments: &CyclesArguments) -> Result<Report, Failure> {
         let mut main_device = MainDevice::request(links, &options);
         let scan = main_device.scan()?;
         let (declaration, start_up) = declare(&scan, begin);
-        let declaration = arguments.resend.adapt(declaration.with_under_way(arguments.under_way.under_way));
+        let declaration = arguments.resend.adapt(arguments.under_way.adapt(declaration));
         let mut application = main_device.activate(declaration).map_err(ringcat::Error::from)?;
         let (reasons, data) = exchange(&mut application, arguments.count, start_up, begin, &end);
         let stop = application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).err();
@@ -95,7 +95,7 @@ pub fn run(arguments: &CyclesArguments) -> Result<Report, Failure> {
         let _awake = thread.apply();
         let scan = supervisor.scan()?;
         let (declaration, start_up) = declare(&scan, begin);
-        let declaration = arguments.resend.adapt(declaration.with_under_way(arguments.under_way.under_way));
+        let declaration = arguments.resend.adapt(arguments.under_way.adapt(declaration));
         let mut application = supervisor.activate(declaration, cyclic).map_err(ringcat::Error::from)?;
         let (reasons, data) = exchange(&mut application, arguments.count, start_up, begin, &end);
         let stop = application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).err();
