@@ -192,7 +192,8 @@ impl Master {
         if let Ok((Answer::Tool(ToolAnswer::Master(report)), _)) = &mut answered {
             report.is_orphaned = self.opened().is_none_or(|opened| opened.is_without_device());
         }
-        if let Some(level) = level.filter(|_| answered.is_ok()) {
+        // Where nothing drives, it counts as soon as something does.
+        if let Some(level) = level.filter(|_| matches!(answered, Ok(_) | Err(Refusal::Fault { .. }))) {
             self.debug_level.store(level, Ordering::Release);
         }
         answered
@@ -200,8 +201,10 @@ impl Master {
 
     fn ask_driver(&self, what: Query, bytes: Vec<u8>) -> Answered {
         let master = self.number;
+        // A level sends nothing: another MainDevice on the segment is no reason against it.
+        let sends = !matches!(what, Query::Tool(ToolQuery::SetDebugLevel { .. }));
         let supervisor = match &*self.driver.lock() {
-            Driver::Daemon(driving, opened) => match self.others.cause() {
+            Driver::Daemon(driving, opened) => match self.others.cause().filter(|_| sends) {
                 Some(cause) => return Err(Refusal::Fault { master, cause }),
                 None => Ok((driving.supervisor().clone(), opened.clone())),
             },

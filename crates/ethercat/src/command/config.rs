@@ -40,7 +40,9 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let positions = positions.transpose()?;
     for master in masters {
         let number = master.master;
-        let lines = selection::declared(declared(session, number)?, aliases.as_ref(), positions.as_ref());
+        let all = declared(session, number);
+        let all = session.if_driven(all)?.unwrap_or_default();
+        let lines = selection::declared(all, aliases.as_ref(), positions.as_ref());
         let slaves = if lines.is_empty() { Vec::new() } else { session.all_slaves(number)? };
         if session.arguments.json {
             json::print(session, &Config::new(number, &lines, &slaves))?;

@@ -20,7 +20,8 @@ pub const COMMAND: Command = Command {
 
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     for master in session.masters()? {
-        let selected = selected(session, master.master)?;
+        let selected = selected(session, master.master);
+        let selected = session.if_driven(selected)?.unwrap_or_default();
         if session.arguments.json {
             json::print(session, &Data::new(master.master, &selected))?;
             continue;

@@ -31,7 +31,8 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let masters = session.masters()?;
     let (is_several, is_verbose) = (masters.len() > 1, session.arguments.verbose);
     for master in masters {
-        let domains = selected(session, master.master)?;
+        let domains = selected(session, master.master);
+        let domains = session.if_driven(domains)?.unwrap_or_default();
         if session.arguments.json {
             json::print(session, &Domains::new(master.master, &domains))?;
             continue;

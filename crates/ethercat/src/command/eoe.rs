@@ -25,8 +25,12 @@ sent. Without interfaces there is no output.
 
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     for master in session.masters()? {
-        let answer = session.tool(master.master, ToolQuery::Ethernet)?;
-        let ToolAnswer::Ethernet(lines) = answer else { return Err(unexpected()) };
+        let answer = session.tool(master.master, ToolQuery::Ethernet);
+        let lines = match session.if_driven(answer)? {
+            Some(ToolAnswer::Ethernet(lines)) => lines,
+            Some(_) => return Err(unexpected()),
+            None => Vec::new(),
+        };
         if session.arguments.json {
             json::print(session, &Ethernet::new(master.master, &lines))?;
         } else if !lines.is_empty() {

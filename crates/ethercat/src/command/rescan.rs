@@ -19,7 +19,9 @@ pub const COMMAND: Command = Command {
 
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     for master in session.masters()? {
-        session.ask(master.master, Query::Rescan, Vec::new())?;
+        // A master that nothing drives is scanned when something does.
+        let scanned = session.ask(master.master, Query::Rescan, Vec::new());
+        session.if_driven(scanned)?;
     }
     Ok(())
 }

@@ -59,6 +59,17 @@ fn a_master_that_waits_for_its_interface_lists_none_and_says_why() {
         let done = bench.tool(&[command]);
         assert!(done.code == Some(0) && done.err.contains(why) && done.out.contains(shown), "{command}: {done:?}");
     }
+    // What shows nothing of a bus without an application, and what has no output.
+    for command in [&["config"][..], &["domains"], &["data"], &["eoe"], &["debug", "1"], &["rescan"]] {
+        let done = bench.tool(command);
+        assert!(done.code == Some(0) && done.err.starts_with(why) && done.out.is_empty(), "{command:?}: {done:?}");
+        let one = bench.tool(&[command, &["-m1"]].concat());
+        assert!(one.code == Some(0) && one.err.starts_with(why) && one.out.is_empty(), "{command:?} -m1: {one:?}");
+    }
+    for command in ["config", "domains", "data", "eoe"] {
+        let done = bench.tool(&[command, "--json"]);
+        assert!(done.code == Some(0) && done.out.lines().count() == 2, "{command}: {done:?}");
+    }
     assert!(bench.good(&["master"]).contains("(waiting...)"));
     let single = bench.bad(&["upload", "-m1", "-p0", "0x1000", "0"]);
     assert!(single.starts_with(&format!("ringcatd: {why}")), "{single}");
