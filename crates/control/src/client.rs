@@ -165,7 +165,7 @@ impl Client {
         let begin = Instant::now();
         loop {
             match self.ask(master, what.clone(), bytes.to_vec()) {
-                Err(ClientError::Refused(Refusal::Changing { .. } | Refusal::TooManyQuestions { .. }))
+                Err(ClientError::Refused(Refusal::Changing { .. } | Refusal::TooManyQueries { .. }))
                     if begin.elapsed() < CHANGE =>
                 {
                     std::thread::sleep(PAUSE);

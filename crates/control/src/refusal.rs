@@ -66,8 +66,8 @@ pub enum Refusal {
         /// So many.
         limit: usize,
     },
-    /// The owner of the master has as many questions as it may have.
-    TooManyQuestions {
+    /// The owner of the master has as many queries as it may have.
+    TooManyQueries {
         /// Number of the master.
         master: u32,
         /// The owner.
@@ -124,8 +124,8 @@ impl fmt::Display for Refusal {
             Refusal::Failed(cause) => f.write_str(cause),
             Refusal::Unexpected { expected } => write!(f, "expected {expected}"),
             Refusal::TooManyClients { limit } => write!(f, "ringcatd has {limit} clients, which is the most it serves"),
-            Refusal::TooManyQuestions { master, owner } => {
-                write!(f, "master {master}: {owner} drives it and has as many questions, or bytes, as it may have")
+            Refusal::TooManyQueries { master, owner } => {
+                write!(f, "master {master}: {owner} drives it and has as many queries, or bytes, as it may have")
             }
             Refusal::Service { text, .. } => f.write_str(text),
         }

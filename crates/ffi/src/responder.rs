@@ -110,7 +110,7 @@ impl Responder {
 pub fn code_of(refusal: &Refusal) -> Code {
     match refusal {
         Refusal::ReadOnly => Code::NOT_RESERVED,
-        Refusal::Owned { .. } | Refusal::Changing { .. } | Refusal::TooManyQuestions { .. } => Code::BUSY,
+        Refusal::Owned { .. } | Refusal::Changing { .. } | Refusal::TooManyQueries { .. } => Code::BUSY,
         Refusal::NoMaster { .. } | Refusal::Fault { .. } => Code::GONE,
         Refusal::Silent { .. } => Code::TIMED_OUT,
         Refusal::Unexpected { .. } => Code::INVALID,

@@ -30,7 +30,7 @@ mod links;
 mod orders;
 mod owned;
 mod ownership;
-mod questions;
+mod query_threads;
 mod received;
 mod receiver;
 mod refusing;

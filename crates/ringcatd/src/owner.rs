@@ -1,7 +1,7 @@
 //! An application that drives a master, on the side of the daemon: queries to it, and their answers.
 //!
 //! What an owner has not answered yet is bounded in number and in bytes, so a message to it always finds room in the
-//! socket, and an owner that is stopped costs each client one second at most. Further questions wait for a place.
+//! socket, and an owner that is stopped costs each client one second at most. Further queries wait for a place.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -14,14 +14,14 @@ use ringcat_control::message::{Answer, Content, Message, Numbered, Owner, Query}
 use ringcat_control::{Connection, Refusal, Right};
 use ringcat_link::process::wait_readable;
 
-/// An owner takes a question within this time.
+/// An owner takes a query within this time.
 pub const SILENCE: Duration = Duration::from_secs(1);
-/// Questions that it may have at a time.
-const MOST_QUESTIONS: usize = 16;
+/// Queries that it may have at a time.
+const MAX_PENDING: usize = 16;
 /// Those of them that only read: the others always find a place.
-const MOST_READING: usize = 12;
-/// Bytes of questions that it may have at a time: half of what a socket holds by default.
-const MOST_BYTES: usize = 96 << 10;
+const MAX_READING: usize = 12;
+/// Bytes of queries that it may have at a time: half of what a socket holds by default.
+const MAX_BYTES: usize = 96 << 10;
 
 /// An answer with its data.
 pub type Answered = Result<(Answer, Vec<u8>), Refusal>;
@@ -36,27 +36,27 @@ pub struct OwnerLink {
     connection: Arc<Connection>,
     /// Readable when its process has ended; there is no such descriptor of a process in another name space.
     end: Option<OwnedFd>,
-    questions: Mutex<Questions>,
+    queries: Mutex<PendingQueries>,
     changed: Condvar,
 }
 
 #[derive(Debug, Default)]
-struct Questions {
+struct PendingQueries {
     last: u32,
-    open: BTreeMap<u32, Question>,
+    open: BTreeMap<u32, PendingQuery>,
     /// The owner does not drive the master any more.
     is_over: bool,
 }
 
-/// A question that has no answer yet.
+/// A query that has no answer yet.
 #[derive(Debug)]
-struct Question {
+struct PendingQuery {
     bytes: usize,
-    state: Standing,
+    state: QueryState,
 }
 
 #[derive(Debug)]
-enum Standing {
+enum QueryState {
     Sent,
     UnderWay,
     Answered(Answered),
@@ -67,8 +67,8 @@ enum Standing {
 impl OwnerLink {
     /// The process at the other end of this connection.
     pub fn new(master: u32, owner: Owner, moves_ethernet: bool, connection: Arc<Connection>) -> OwnerLink {
-        let (questions, changed) = (Mutex::default(), Condvar::new());
-        OwnerLink { master, owner, moves_ethernet, connection, end: None, questions, changed }
+        let (queries, changed) = (Mutex::default(), Condvar::new());
+        OwnerLink { master, owner, moves_ethernet, connection, end: None, queries, changed }
     }
 
     /// With the descriptor that shows the end of its process.
@@ -96,8 +96,8 @@ impl OwnerLink {
         &self.connection
     }
 
-    fn questions(&self) -> MutexGuard<'_, Questions> {
-        self.questions.lock().unwrap_or_else(PoisonError::into_inner)
+    fn queries(&self) -> MutexGuard<'_, PendingQueries> {
+        self.queries.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Sends a query, and waits for the answer: a second for a sign, longer for the result of what it has begun.
@@ -106,100 +106,100 @@ impl OwnerLink {
     /// The owner refuses, is silent, or has ended.
     pub fn ask(&self, what: Query, bytes: Vec<u8>) -> Answered {
         let (master, size, limit) = (self.master, bytes.len(), what.limit());
-        let mut questions = self.place(size, what.right())?;
-        questions.last = questions.last.wrapping_add(1);
-        let id = questions.last;
-        questions.open.insert(id, Question { bytes: size, state: Standing::Sent });
-        drop(questions);
+        let mut queries = self.place(size, what.right())?;
+        queries.last = queries.last.wrapping_add(1);
+        let id = queries.last;
+        queries.open.insert(id, PendingQuery { bytes: size, state: QueryState::Sent });
+        drop(queries);
         let message = Message { content: Content::Query(Numbered { id, master, what }), bytes };
         match self.connection.send_within(&message, SILENCE) {
             Ok(()) => self.wait(id, limit),
             // A part of it may have left: the rest follows, and so may an answer.
             Err(error) if error.kind() == io::ErrorKind::TimedOut => {
-                if let Some(question) = self.questions().open.get_mut(&id) {
-                    question.state = Standing::Forgotten;
+                if let Some(query) = self.queries().open.get_mut(&id) {
+                    query.state = QueryState::Forgotten;
                 }
                 let limit_ms = SILENCE.as_millis() as u32;
                 Err(Refusal::Silent { master, owner: self.owner.clone(), limit_ms })
             }
             Err(_) => {
-                self.questions().open.remove(&id);
+                self.queries().open.remove(&id);
                 self.changed.notify_all();
                 Err(Refusal::Changing { master })
             }
         }
     }
 
-    /// Waits until the owner may have another question of this size.
-    fn place(&self, size: usize, right: Right) -> Result<MutexGuard<'_, Questions>, Refusal> {
+    /// Waits until the owner may have another query of this size.
+    fn place(&self, size: usize, right: Right) -> Result<MutexGuard<'_, PendingQueries>, Refusal> {
         let begin = Instant::now();
-        let most = if right == Right::Read { MOST_READING } else { MOST_QUESTIONS };
-        let mut questions = self.questions();
+        let most = if right == Right::Read { MAX_READING } else { MAX_PENDING };
+        let mut queries = self.queries();
         loop {
-            if questions.is_over {
+            if queries.is_over {
                 return Err(Refusal::Changing { master: self.master });
             }
-            let waiting: usize = questions.open.values().map(|question| question.bytes).sum();
-            if questions.open.len() < most && waiting + size <= MOST_BYTES {
-                return Ok(questions);
+            let waiting: usize = queries.open.values().map(|query| query.bytes).sum();
+            if queries.open.len() < most && waiting + size <= MAX_BYTES {
+                return Ok(queries);
             }
             let left = SILENCE.saturating_sub(begin.elapsed());
-            if left.is_zero() || size > MOST_BYTES {
-                return Err(Refusal::TooManyQuestions { master: self.master, owner: self.owner.clone() });
+            if left.is_zero() || size > MAX_BYTES {
+                return Err(Refusal::TooManyQueries { master: self.master, owner: self.owner.clone() });
             }
-            questions = self.changed.wait_timeout(questions, left).unwrap_or_else(PoisonError::into_inner).0;
+            queries = self.changed.wait_timeout(queries, left).unwrap_or_else(PoisonError::into_inner).0;
         }
     }
 
-    /// Waits for the answer to a question that may take `answer`.
+    /// Waits for the answer to a query that may take `answer`.
     fn wait(&self, id: u32, answer: Duration) -> Answered {
         let begin = Instant::now();
-        let mut questions = self.questions();
+        let mut queries = self.queries();
         loop {
-            let Some(question) = questions.open.get_mut(&id) else {
+            let Some(query) = queries.open.get_mut(&id) else {
                 return Err(Refusal::Changing { master: self.master });
             };
-            let limit = match question.state {
-                Standing::Answered(_) => {
-                    let answered = questions.open.remove(&id).map(|question| question.state);
-                    let Some(Standing::Answered(answered)) = answered else { continue };
-                    // There is room for another question.
+            let limit = match query.state {
+                QueryState::Answered(_) => {
+                    let answered = queries.open.remove(&id).map(|query| query.state);
+                    let Some(QueryState::Answered(answered)) = answered else { continue };
+                    // There is room for another query.
                     self.changed.notify_all();
                     return answered;
                 }
-                Standing::UnderWay => answer,
-                Standing::Sent | Standing::Forgotten => SILENCE,
+                QueryState::UnderWay => answer,
+                QueryState::Sent | QueryState::Forgotten => SILENCE,
             };
             let left = limit.saturating_sub(begin.elapsed());
             if left.is_zero() {
-                question.state = Standing::Forgotten;
+                query.state = QueryState::Forgotten;
                 let limit_ms = limit.as_millis() as u32;
                 return Err(Refusal::Silent { master: self.master, owner: self.owner.clone(), limit_ms });
             }
-            questions = self.changed.wait_timeout(questions, left).unwrap_or_else(PoisonError::into_inner).0;
+            queries = self.changed.wait_timeout(queries, left).unwrap_or_else(PoisonError::into_inner).0;
         }
     }
 
-    /// The owner has taken a question.
+    /// The owner has taken a query.
     pub fn taken(&self, id: u32) {
-        if let Some(question) = self.questions().open.get_mut(&id)
-            && matches!(question.state, Standing::Sent)
+        if let Some(query) = self.queries().open.get_mut(&id)
+            && matches!(query.state, QueryState::Sent)
         {
-            question.state = Standing::UnderWay;
+            query.state = QueryState::UnderWay;
             self.changed.notify_all();
         }
     }
 
     /// The owner has answered. Answers that nothing waits for are dropped.
     pub fn answered(&self, id: u32, answer: Answered) {
-        let mut questions = self.questions();
-        match questions.open.get_mut(&id) {
-            Some(Question { state: Standing::Forgotten, .. }) => {
-                questions.open.remove(&id);
+        let mut queries = self.queries();
+        match queries.open.get_mut(&id) {
+            Some(PendingQuery { state: QueryState::Forgotten, .. }) => {
+                queries.open.remove(&id);
                 self.changed.notify_all();
             }
-            Some(question) if !matches!(question.state, Standing::Answered(_)) => {
-                question.state = Standing::Answered(answer);
+            Some(query) if !matches!(query.state, QueryState::Answered(_)) => {
+                query.state = QueryState::Answered(answer);
                 self.changed.notify_all();
             }
             Some(_) | None => {}
@@ -208,9 +208,9 @@ impl OwnerLink {
 
     /// The owner does not drive the master any more: all that wait for it get an answer.
     pub fn end(&self) {
-        let mut questions = self.questions();
-        questions.is_over = true;
-        questions.open.clear();
+        let mut queries = self.queries();
+        queries.is_over = true;
+        queries.open.clear();
         self.changed.notify_all();
     }
 }
@@ -240,18 +240,18 @@ mod tests {
 
     use super::*;
 
-    const QUESTION: Query = Query::AlStatus { position: 1 };
+    const QUERY: Query = Query::AlStatus { position: 1 };
 
     // covers: daemon
     #[test]
-    fn a_silent_owner_is_named_after_a_second_and_holds_a_bounded_number_of_questions() {
+    fn a_silent_owner_is_named_after_a_second_and_holds_a_bounded_number_of_queries() {
         let (owner, _far) = for_tests().expect("a pair");
         let owner = Arc::new(owner);
         let begin = Instant::now();
-        let all: Vec<_> = (0..MOST_READING)
+        let all: Vec<_> = (0..MAX_READING)
             .map(|_| {
                 let owner = owner.clone();
-                thread::spawn(move || owner.ask(QUESTION, Vec::new()))
+                thread::spawn(move || owner.ask(QUERY, Vec::new()))
             })
             .collect();
         for one in all {
@@ -260,33 +260,33 @@ mod tests {
         }
         assert!((SILENCE..2 * SILENCE).contains(&begin.elapsed()));
         let begin = Instant::now();
-        assert!(matches!(owner.ask(QUESTION, Vec::new()), Err(Refusal::TooManyQuestions { .. })));
+        assert!(matches!(owner.ask(QUERY, Vec::new()), Err(Refusal::TooManyQueries { .. })));
         assert!(begin.elapsed() < 2 * SILENCE);
         let refused = owner.ask(Query::Rescan, Vec::new()).expect_err("nothing answers");
-        assert!(matches!(refused, Refusal::Silent { .. }), "questions that change have places of their own: {refused}");
+        assert!(matches!(refused, Refusal::Silent { .. }), "queries that change have places of their own: {refused}");
     }
 
     // covers: daemon
     #[test]
-    fn answers_reach_their_questions_in_any_order_and_late_ones_nothing() {
+    fn answers_reach_their_queries_in_any_order_and_late_ones_nothing() {
         let (owner, far) = for_tests().expect("a pair");
         let owner = Arc::new(owner);
         let asking = owner.clone();
-        let first = thread::spawn(move || asking.ask(QUESTION, vec![1]));
-        let question = far.receive(Limits::OWNER, None).expect("it is asked");
-        let Content::Query(Numbered { id, .. }) = question.content else { panic!("{question:?}") };
+        let first = thread::spawn(move || asking.ask(QUERY, vec![1]));
+        let query = far.receive(Limits::OWNER, None).expect("it is asked");
+        let Content::Query(Numbered { id, .. }) = query.content else { panic!("{query:?}") };
         owner.taken(id);
         owner.answered(id + 1, Ok((Answer::Done, Vec::new())));
         thread::sleep(SILENCE + Duration::from_millis(100));
         owner.answered(id, Ok((Answer::Data, vec![7])));
         owner.answered(id, Ok((Answer::Done, Vec::new())));
         assert_eq!(first.join().expect("no panic"), Ok((Answer::Data, vec![7])));
-        assert!(owner.ask(QUESTION, vec![0; MOST_BYTES + 1]).is_err());
+        assert!(owner.ask(QUERY, vec![0; MAX_BYTES + 1]).is_err());
         let asking = owner.clone();
-        let last = thread::spawn(move || asking.ask(QUESTION, Vec::new()));
+        let last = thread::spawn(move || asking.ask(QUERY, Vec::new()));
         far.receive(Limits::OWNER, None).expect("it is asked");
         owner.end();
         assert_eq!(last.join().expect("no panic"), Err(Refusal::Changing { master: 0 }));
-        assert_eq!(owner.ask(QUESTION, Vec::new()), Err(Refusal::Changing { master: 0 }));
+        assert_eq!(owner.ask(QUERY, Vec::new()), Err(Refusal::Changing { master: 0 }));
     }
 }

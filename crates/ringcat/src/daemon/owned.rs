@@ -1,6 +1,6 @@
 //! A bus that a daemon has handed over to this process.
 //!
-//! A thread receives the messages of the daemon ([`Receiver`]): questions of its clients, and the end of the
+//! A thread receives the messages of the daemon ([`Receiver`]): queries of its clients, and the end of the
 //! connection. It sends the daemon what is known of the segment after each scan, so that no scan is necessary after a
 //! crash of this process.
 
@@ -22,7 +22,7 @@ use super::ethernet::Ethernet;
 use super::links::DaemonLinks;
 use super::orders::Orders;
 use super::ownership::{Ownership, OwnershipWatch};
-use super::questions::Questions;
+use super::query_threads::QueryThreads;
 use super::received::Received;
 use super::receiver::Receiver;
 use crate::links::Links;
@@ -57,7 +57,7 @@ pub struct OwnedBus {
 impl OwnedBus {
     /// Takes the bus of a master from the daemon at this socket. `program` is the name with which the daemon names this
     /// process to others; `prepare` runs first in each thread: that of the acyclic half, and those for
-    /// questions of the daemon. Returns when the SubDevices were found in the knowledge of the daemon; no SII is read.
+    /// queries of the daemon. Returns when the SubDevices were found in the knowledge of the daemon; no SII is read.
     ///
     /// # Errors
     /// [`DaemonError::is_no_daemon`]: none answers. The daemon refuses: there is no such master, another process drives
@@ -107,13 +107,14 @@ impl OwnedBus {
         let events = supervisor.register_client(scans, KEPT)?;
         // A segment that does not answer any more is watched as any other.
         let scan = if is_known { supervisor.finish_scan(|| ()).ok() } else { None };
-        let questions = Questions::start(&supervisor, &connection, &in_threads).map_err(crate::error::Error::Thread)?;
+        let queries =
+            QueryThreads::start(&supervisor, &connection, &in_threads).map_err(crate::error::Error::Thread)?;
         let (ownership, links) = (OwnershipWatch::default(), handed.links);
         let receiver = Receiver {
             supervisor: supervisor.clone(),
             connection: connection.clone(),
             ownership: ownership.clone(),
-            questions,
+            queries,
             orders,
             ethernet: ethernet.clone(),
             events,

@@ -15,7 +15,7 @@ use ringcat_link::process::wait_readable;
 use super::ethernet::Ethernet;
 use super::orders::Orders;
 use super::ownership::OwnershipWatch;
-use super::questions::Questions;
+use super::query_threads::QueryThreads;
 use crate::services::Services;
 use crate::supervisor_thread::SupervisorThread;
 
@@ -29,7 +29,7 @@ pub(super) struct Receiver {
     pub supervisor: SupervisorThread,
     pub connection: Arc<Connection>,
     pub ownership: OwnershipWatch,
-    pub questions: Questions,
+    pub queries: QueryThreads,
     pub orders: Arc<Orders>,
     pub ethernet: Ethernet,
     /// Events of scans.
@@ -81,7 +81,7 @@ impl Receiver {
     /// Takes a message; false if it was the last one.
     fn take(&self, message: Message, descriptor: Option<OwnedFd>) -> bool {
         match message.content {
-            Content::Query(question) => self.questions.take(question, message.bytes),
+            Content::Query(query) => self.queries.take(query, message.bytes),
             Content::Interface { name, fault } => {
                 let made = fault.map_or_else(|| descriptor.ok_or_else(|| "no descriptor came".to_owned()), Err);
                 self.ethernet.answered(name, made);

@@ -1,6 +1,6 @@
-//! Threads that answer the questions which a daemon passes to the owner of a bus.
+//! Threads that answer the queries which a daemon passes to the owner of a bus.
 //!
-//! So that a slow SubDevice does not keep other questions waiting, there are some of them. They hold their answers back
+//! So that a slow SubDevice does not keep other queries waiting, there are some of them. They hold their answers back
 //! from nothing: a full queue refuses.
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -15,24 +15,24 @@ use crate::supervisor_thread::SupervisorThread;
 
 /// Stack of each: a program may have locked its memory, and with it these.
 const STACK_BYTES: usize = 256 << 10;
-/// Threads for questions that a mailbox answers, and so questions to slow SubDevices at a time.
+/// Threads for queries that a mailbox answers, and so queries to slow SubDevices at a time.
 const SLOW: usize = 3;
-/// Threads for all other questions: slow SubDevices do not delay those about registers and states.
+/// Threads for all other queries: slow SubDevices do not delay those about registers and states.
 const QUICK: usize = 1;
-/// Questions that wait for a thread. The daemon has no more under way.
+/// Queries that wait for a thread. The daemon has no more under way.
 const WAITING: usize = 16;
 
-type Question = (Numbered<Query>, Vec<u8>);
+type QueuedQuery = (Numbered<Query>, Vec<u8>);
 
-/// Where questions are put. The threads end when it is dropped.
+/// Where queries are put. The threads end when it is dropped.
 #[derive(Debug)]
-pub(super) struct Questions {
-    slow: SyncSender<Question>,
-    quick: SyncSender<Question>,
+pub(super) struct QueryThreads {
+    slow: SyncSender<QueuedQuery>,
+    quick: SyncSender<QueuedQuery>,
     connection: Arc<Connection>,
 }
 
-impl Questions {
+impl QueryThreads {
     /// Starts the threads. `prepare` runs first in each.
     ///
     /// # Errors
@@ -41,9 +41,9 @@ impl Questions {
         supervisor: &SupervisorThread,
         connection: &Arc<Connection>,
         prepare: &(impl Fn() + Clone + Send + 'static),
-    ) -> std::io::Result<Questions> {
-        let start = |threads| Questions::queue(threads, supervisor, connection, prepare);
-        Ok(Questions { slow: start(SLOW)?, quick: start(QUICK)?, connection: connection.clone() })
+    ) -> std::io::Result<QueryThreads> {
+        let start = |threads| QueryThreads::queue(threads, supervisor, connection, prepare);
+        Ok(QueryThreads { slow: start(SLOW)?, quick: start(QUICK)?, connection: connection.clone() })
     }
 
     /// A queue with this number of threads.
@@ -52,7 +52,7 @@ impl Questions {
         supervisor: &SupervisorThread,
         connection: &Arc<Connection>,
         prepare: &(impl Fn() + Clone + Send + 'static),
-    ) -> std::io::Result<SyncSender<Question>> {
+    ) -> std::io::Result<SyncSender<QueuedQuery>> {
         let (queue, waiting) = sync_channel(WAITING);
         let waiting = Arc::new(Mutex::new(waiting));
         for _ in 0..threads {
@@ -67,14 +67,14 @@ impl Questions {
         Ok(queue)
     }
 
-    /// Takes a question, and says so.
-    pub fn take(&self, question: Numbered<Query>, bytes: Vec<u8>) {
-        let (id, master) = (question.id, question.master);
-        let queue = if is_quick(&question.what) { &self.quick } else { &self.slow };
-        match queue.try_send((question, bytes)) {
+    /// Takes a query, and says so.
+    pub fn take(&self, query: Numbered<Query>, bytes: Vec<u8>) {
+        let (id, master) = (query.id, query.master);
+        let queue = if is_quick(&query.what) { &self.quick } else { &self.slow };
+        match queue.try_send((query, bytes)) {
             Ok(()) => send(&self.connection, Content::Underway { id }.into()),
             Err(_) => {
-                let what = Err(Refusal::Failed("the application answers as many questions as it can".to_owned()));
+                let what = Err(Refusal::Failed("the application answers as many queries as it can".to_owned()));
                 send(&self.connection, Content::Answer(Numbered { id, master, what }).into());
             }
         }
@@ -100,7 +100,7 @@ fn is_quick(ask: &Query) -> bool {
     )
 }
 
-fn serve(supervisor: &SupervisorThread, connection: &Connection, waiting: &Mutex<Receiver<Question>>) {
+fn serve(supervisor: &SupervisorThread, connection: &Connection, waiting: &Mutex<Receiver<QueuedQuery>>) {
     loop {
         let next = waiting.lock().unwrap_or_else(PoisonError::into_inner).recv();
         let Ok((Numbered { id, master, what }, bytes)) = next else { return };

@@ -1,4 +1,4 @@
-//! Questions about the bus: states, links, SubDevices.
+//! Queries about the bus: states, links, SubDevices.
 
 use std::ffi::{c_int, c_uint};
 
