@@ -20,6 +20,7 @@ mod properties;
 mod replugged;
 mod samples;
 mod signals;
+mod twins;
 mod unlisted;
 mod written;
 
@@ -35,6 +36,7 @@ use crate::configuration::Configuration;
 use align::Place;
 
 pub use difference::{Difference, DifferenceKind, FoundNetwork, Stated, StatedSyncManager};
+#[cfg(feature = "network")]
 pub(crate) use properties::ports;
 
 impl Configuration {
@@ -65,6 +67,7 @@ impl Configuration {
         let differs = |config: usize, prevents_op: bool, error: &ConfigError| {
             let (kind, position) = match error {
                 ConfigError::Mismatch { position, field, .. } => (DifferenceKind::of_field(*field), Some(*position)),
+                ConfigError::Ambiguous { first, .. } => (DifferenceKind::Ambiguous, Some(*first)),
                 _ => (DifferenceKind::Missing, None),
             };
             let name = names.get(config).cloned().unwrap_or_default();
@@ -94,9 +97,9 @@ impl Configuration {
     }
 
     /// Every difference between the network of a scan and the file: SubDevices that are missing, additional or at
-    /// another place, revision, serial number, PDOs, modules, mailboxes, SyncManagers, ports, cables, clocks, rings.
-    /// `stated` are the
-    /// [`Stated`] properties by the index of the SubDevice; it may be empty.
+    /// another place, several with one alias or identification, revision, serial number, PDOs, modules, mailboxes,
+    /// SyncManagers, ports, cables, clocks, rings. `stated` are the [`Stated`] properties by the index of the
+    /// SubDevice; it may be empty.
     pub fn differences(&self, network: FoundNetwork<'_>, stated: &[Stated]) -> Vec<Difference> {
         let FoundNetwork { subdevices: found, topology, firmware, modules, .. } = network;
         let names = self.names();
@@ -133,6 +136,7 @@ impl Configuration {
                 Place::Additional { info } => differences.push(additional(&found[info], marks.shifts(info))),
             }
         }
+        differences.extend(twins::differences(self, found, &names, &marks));
         self.settle(&marks, &order, found, &mut differences);
         if !differences.iter().any(|difference| difference.kind == DifferenceKind::Order) {
             differences.extend(cables::compare(self, &pairs, found, topology));

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use ringcat_engine::config::{ConfigAddress, Resolution, SubDeviceConfig, resolve};
+use ringcat_engine::config::{ConfigAddress, Marked, Resolution, SubDeviceConfig, resolve};
 use ringcat_engine::info::SubDeviceInfo;
 
 use super::alike::{Alike, DeviceKey, device, is_device, keys_of};
@@ -12,6 +12,8 @@ use crate::configuration::Configuration;
 
 /// Maximum number of compared pairs between the common begin and end; beyond it SubDevices are compared by position.
 const MAX_PAIRS: usize = 1 << 24;
+/// Maximum number of SubDevices with one mark that are tried for a declaration.
+const MAX_TWINS: usize = 64;
 
 /// The counterpart of a SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,7 +48,7 @@ pub(super) fn align(configuration: &Configuration, found: &[SubDeviceInfo], stat
     for (config, info) in activated(configs, found, stated) {
         (info_of[config], taken[info]) = (Some(info), true);
     }
-    by_mark(configs, found, &mut info_of, &mut taken);
+    by_mark(configs, (found, stated), &mut info_of, &mut taken);
     let alike = Alike::new(configs, found, stated);
     let mut declared: Vec<usize> = (0..configs.len()).filter(|config| by_position(&configs[*config])).collect();
     declared.sort_by_key(|config| position(&configs[*config]));
@@ -214,24 +216,24 @@ pub(super) fn position(config: &SubDeviceConfig) -> usize {
     }
 }
 
-/// SubDevices that are declared by alias, identification or data word.
-fn by_mark(configs: &[SubDeviceConfig], found: &[SubDeviceInfo], info_of: &mut [Option<usize>], taken: &mut [bool]) {
-    let aliases: BTreeMap<u16, usize> = (0..found.len()).rev().map(|at| (found[at].alias, at)).collect();
-    let marks: BTreeMap<u16, usize> =
-        (0..found.len()).rev().filter_map(|at| Some((found[at].identification?, at))).collect();
+/// SubDevices that are declared by alias, identification or data word. Of several with one mark, none of which the
+/// activation takes, it is the first that is the declared device.
+fn by_mark(
+    configs: &[SubDeviceConfig],
+    (found, stated): (&[SubDeviceInfo], &[Stated]),
+    info_of: &mut [Option<usize>],
+    taken: &mut [bool],
+) {
+    let marked = Marked::new(found);
     for (config, declared) in configs.iter().enumerate() {
-        let head = match declared.address {
-            ConfigAddress::Alias { alias, offset } if alias != 0 => {
-                aliases.get(&alias).map(|at| at + usize::from(offset))
-            }
-            ConfigAddress::Identification { value, offset } => marks.get(&value).map(|at| at + usize::from(offset)),
-            ConfigAddress::DataWord { register, value, offset } => {
-                let head = found.iter().position(|info| info.data_word(register) == Some(value));
-                head.map(|at| at + usize::from(offset))
-            }
-            _ => None,
-        };
-        if let Some(info) = head.filter(|info| *info < found.len() && !taken[*info]) {
+        if info_of[config].is_some() {
+            continue;
+        }
+        let heads = marked.all(declared.address);
+        let places = heads.map(|head| head + declared.address.offset()).take(MAX_TWINS);
+        let free: Vec<usize> = places.filter(|info| taken.get(*info) == Some(&false)).collect();
+        let own = free.iter().copied().find(|info| is_device(declared, stated.get(config), &found[*info]));
+        if let Some(info) = own.or(free.first().copied()) {
             (info_of[config], taken[info]) = (Some(info), true);
         }
     }

@@ -35,6 +35,8 @@ pub enum DifferenceKind {
     Additional,
     /// A SubDevice is at another place.
     Order,
+    /// Several SubDevices have the alias, identification or data word by which the file finds one.
+    Ambiguous,
     /// Another device: vendor or product.
     Device,
     /// Another revision.
@@ -74,6 +76,7 @@ impl DifferenceKind {
             DifferenceKind::Missing => "missing",
             DifferenceKind::Additional => "additional",
             DifferenceKind::Order => "order",
+            DifferenceKind::Ambiguous => "ambiguous",
             DifferenceKind::Device => "device",
             DifferenceKind::Revision => "revision",
             DifferenceKind::Serial => "serial",

@@ -32,14 +32,17 @@ impl Marks {
         marks
     }
 
+    /// The declarations without a SubDevice, each with the reason.
+    pub(super) fn errors(&self) -> impl Iterator<Item = (usize, &ConfigError)> {
+        self.resolutions.iter().filter_map(|resolution| match resolution {
+            Resolution::Failed { config, error } | Resolution::Absent { config, error } => Some((*config, error)),
+            Resolution::Found { .. } | Resolution::Extra { .. } => None,
+        })
+    }
+
     /// The first declaration with which the activation fails.
     pub(super) fn first_failing(&self) -> Option<(usize, &ConfigError)> {
-        self.resolutions.iter().find_map(|resolution| match resolution {
-            Resolution::Failed { config, error } | Resolution::Absent { config, error } => {
-                self.fails(*config).then_some((*config, error))
-            }
-            _ => None,
-        })
+        self.errors().find(|(config, _)| self.fails(*config))
     }
 
     /// The SubDevices whose declarations fail because of their positions, in the order of the file.

@@ -41,8 +41,8 @@ pub enum ConfigAddress {
 }
 
 impl ConfigAddress {
-    /// Number of SubDevices behind the one with the alias or identification.
-    pub(super) fn offset(self) -> usize {
+    /// Number of SubDevices behind the one with the alias, identification or data word; 0 for a position.
+    pub fn offset(self) -> usize {
         match self {
             ConfigAddress::Alias { offset, .. }
             | ConfigAddress::Identification { offset, .. }
@@ -81,8 +81,8 @@ impl ConfigAddress {
         }
     }
 
-    /// The alias or identification from which the address counts, for messages.
-    pub(super) fn mark(self) -> impl fmt::Display {
+    /// The alias, identification or data word from which the address counts, or the position, for messages.
+    pub fn mark(self) -> impl fmt::Display {
         struct Mark(ConfigAddress);
         impl fmt::Display for Mark {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -1,6 +1,7 @@
 //! Whether the SubDevice at a place matches its declaration; finds an alias or identification.
 
 use alloc::vec::Vec;
+use core::borrow::Borrow;
 
 use ringcat_wire::address::RegisterAddress;
 
@@ -39,52 +40,72 @@ pub(super) fn missing(declared: &SubDeviceConfig, config: usize, error: ConfigEr
     if declared.optional { Resolution::Absent { config, error } } else { Resolution::Failed { config, error } }
 }
 
-/// The SubDevices by their aliases, identifications and data words, in their order.
-pub(super) struct Marked {
-    aliases: Vec<(u16, usize)>,
-    identifications: Vec<(u16, usize)>,
-    data_words: Vec<((RegisterAddress, u16), usize)>,
+/// What identifies a SubDevice at any place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Mark {
+    Alias(u16),
+    Identification(u16),
+    DataWord(RegisterAddress, u16),
+}
+
+impl Mark {
+    /// The mark from which an address counts; `None` for a position, and for alias 0, which is one.
+    const fn of(address: ConfigAddress) -> Option<Mark> {
+        match address {
+            ConfigAddress::Alias { alias: 0, .. } | ConfigAddress::Position(_) => None,
+            ConfigAddress::Alias { alias, .. } => Some(Mark::Alias(alias)),
+            ConfigAddress::Identification { value, .. } => Some(Mark::Identification(value)),
+            ConfigAddress::DataWord { register, value, .. } => Some(Mark::DataWord(register, value)),
+        }
+    }
+
+    /// All marks of a SubDevice.
+    fn all_of(info: &SubDeviceInfo) -> impl Iterator<Item = Mark> {
+        let alias = (info.alias != 0).then_some(Mark::Alias(info.alias));
+        let words = info.data_words.iter().map(|word| Mark::DataWord(word.register, word.value));
+        alias.into_iter().chain(info.identification.map(Mark::Identification)).chain(words)
+    }
+}
+
+/// The SubDevices of a scan by their aliases, identifications and data words.
+#[derive(Clone, Debug)]
+pub struct Marked {
+    /// In the order of marks, then of the SubDevices.
+    marks: Vec<(Mark, usize)>,
 }
 
 impl Marked {
-    pub(super) fn new(infos: &[&SubDeviceInfo]) -> Marked {
-        let indexed = || infos.iter().enumerate();
-        let mut aliases: Vec<(u16, usize)> =
-            indexed().filter(|(_, info)| info.alias != 0).map(|(at, info)| (info.alias, at)).collect();
-        let mut identifications: Vec<(u16, usize)> =
-            indexed().filter_map(|(at, info)| Some((info.identification?, at))).collect();
-        let words = |(at, info): (usize, &&SubDeviceInfo)| {
-            info.data_words.iter().map(move |word| ((word.register, word.value), at)).collect::<Vec<_>>()
-        };
-        let mut data_words: Vec<((RegisterAddress, u16), usize)> = indexed().flat_map(words).collect();
-        aliases.put_in_order();
-        identifications.put_in_order();
-        data_words.put_in_order();
-        Marked { aliases, identifications, data_words }
+    /// Reads the marks of the SubDevices of a scan.
+    pub fn new(infos: &[impl Borrow<SubDeviceInfo>]) -> Marked {
+        let indexed = infos.iter().map(Borrow::borrow).enumerate();
+        let mut marks: Vec<(Mark, usize)> =
+            indexed.flat_map(|(at, info)| Mark::all_of(info).map(move |mark| (mark, at))).collect();
+        marks.put_in_order();
+        Marked { marks }
+    }
+
+    /// Indices of all SubDevices with the alias, identification or data word of an address, in their order. An
+    /// activation takes the only one, and refuses the declaration if there are several. None for a position and for
+    /// alias 0, which is one.
+    pub fn all(&self, address: ConfigAddress) -> impl Iterator<Item = usize> {
+        let mark = Mark::of(address);
+        let first = self.marks.partition_point(|(other, _)| Some(*other) < mark);
+        self.marks[first..].iter().take_while(move |(other, _)| Some(*other) == mark).map(|(_, at)| *at)
     }
 
     /// The only SubDevice with the alias, identification or data word of an address; the first one for alias 0.
     pub(super) fn find(&self, address: ConfigAddress, infos: &[&SubDeviceInfo]) -> Result<Option<usize>, ConfigError> {
-        let found = match address {
-            ConfigAddress::Alias { alias: 0, .. } => return Ok((!infos.is_empty()).then_some(0)),
-            ConfigAddress::Alias { alias, .. } => first_two(&self.aliases, alias),
-            ConfigAddress::Identification { value, .. } => first_two(&self.identifications, value),
-            ConfigAddress::DataWord { register, value, .. } => first_two(&self.data_words, (register, value)),
-            ConfigAddress::Position(_) => return Ok(None),
-        };
+        if matches!(address, ConfigAddress::Alias { alias: 0, .. }) {
+            return Ok((!infos.is_empty()).then_some(0));
+        }
         step();
-        match found {
-            [Some(first), Some(second)] => {
+        let mut all = self.all(address);
+        match (all.next(), all.next()) {
+            (Some(first), Some(second)) => {
                 let [first, second] = [first, second].map(|at| infos[at].position);
                 Err(ConfigError::Ambiguous { address, first, second })
             }
-            [first, _] => Ok(first),
+            (first, _) => Ok(first),
         }
     }
-}
-
-/// The first two with a mark, of marks in order.
-fn first_two<M: Ord + Copy>(marks: &[(M, usize)], mark: M) -> [Option<usize>; 2] {
-    let first = marks.partition_point(|(other, _)| *other < mark);
-    [first, first + 1].map(|at| marks.get(at).filter(|(other, _)| *other == mark).map(|(_, at)| *at))
 }

@@ -21,6 +21,7 @@ mod clocks;
 mod command_reports;
 mod compare_process_data;
 mod compare_refusals;
+mod compare_twins;
 mod configuration;
 mod copies;
 mod crossed_rings;

@@ -1,0 +1,171 @@
+//! `compare` names several SubDevices with one alias, identification or data word, of which the activation takes none.
+//! The same network is activated on the simulated bus, and has to reach OP exactly if no difference is marked.
+
+use std::time::Duration;
+
+use ringcat::config::network::model::{Required, SubDevice};
+use ringcat::config::{Difference, DifferenceKind, FoundNetwork};
+use ringcat::network::{LoadedNetwork, NetworkFile, ScanOptions};
+use ringcat::simulated::SimulatedSegment;
+use ringcat::{MainDevice, Options, Scan};
+use ringcat_sim::description::DeviceDescription;
+use ringcat_sim::network::NetworkOptions;
+use scenarios::segments::{descriptions, line};
+
+use DifferenceKind::{Additional, Ambiguous, Missing};
+
+const LIMIT: Duration = Duration::from_secs(5);
+const PERIOD: Duration = Duration::from_millis(1);
+/// Address of a data word that no SII names.
+const WORD: u16 = 0x1000;
+
+/// What tells SubDevices apart.
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    Alias,
+    Identification,
+    DataWord,
+}
+
+const KINDS: [Kind; 3] = [Kind::Alias, Kind::Identification, Kind::DataWord];
+
+impl Kind {
+    fn give(self, device: &mut DeviceDescription, value: u16) {
+        match self {
+            Kind::Alias => device.alias = value,
+            Kind::Identification => device.identification = Some(value),
+            Kind::DataWord => (device.id_switch_address, device.data_word) = (None, Some((WORD, value))),
+        }
+    }
+
+    fn declare(self, subdevice: &mut SubDevice, value: u16) {
+        subdevice.position = None;
+        match self {
+            Kind::Alias => subdevice.alias = Some(value),
+            Kind::Identification => subdevice.identification = Some(value),
+            Kind::DataWord => {
+                (subdevice.identification, subdevice.identification_word) = (Some(value), Some(WORD));
+            }
+        }
+    }
+
+    fn words(self) -> &'static str {
+        match self {
+            Kind::Alias => "alias 7",
+            Kind::Identification => "identification 7",
+            Kind::DataWord => "data word 7 at 0x1000",
+        }
+    }
+}
+
+/// Devices of these types; those of a type with `=` behind it have this mark.
+fn devices(types: &[&str], kind: Kind) -> Vec<DeviceDescription> {
+    let (names, values): (Vec<&str>, Vec<Option<u16>>) = types
+        .iter()
+        .map(|it| it.split_once('=').map_or((*it, None), |(name, value)| (name, value.parse().ok())))
+        .unzip();
+    let mut devices = descriptions(&names);
+    for (device, value) in devices.iter_mut().zip(values) {
+        if let Some(value) = value {
+            kind.give(device, value);
+        }
+    }
+    devices
+}
+
+fn scanned(types: &[&str], kind: Kind) -> (MainDevice<SimulatedSegment>, Scan) {
+    let network = line(devices(types, kind), NetworkOptions::default());
+    let mut main_device = MainDevice::request(SimulatedSegment::new(network), &Options::default());
+    let scan = main_device.scan().expect("the scan succeeds");
+    (main_device, scan)
+}
+
+/// The file of a bus, after a change.
+fn file_of(types: &[&str], kind: Kind, change: impl FnOnce(&mut NetworkFile)) -> LoadedNetwork {
+    let (_, scan) = scanned(types, kind);
+    let mut file = NetworkFile::from_scan(&scan.subdevices, &scan.topology, &ScanOptions::new("machine", PERIOD));
+    for subdevice in &mut file.subdevice {
+        (subdevice.position, subdevice.plugged_into) = (None, None);
+    }
+    change(&mut file);
+    let text = file.to_text();
+    LoadedNetwork::from_bytes("machine.toml", text.as_bytes()).unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+/// The differences of a bus, whose marks are checked on the bus.
+fn checked(network: &LoadedNetwork, types: &[&str], kind: Kind) -> Vec<Difference> {
+    let (mut main_device, mut scan) = scanned(types, kind);
+    main_device.read_data_words(&network.configuration.declaration.subdevices, &mut scan);
+    let found = FoundNetwork::new(&scan.subdevices, &scan.topology);
+    let differences = network.configuration.differences(found, &network.stated());
+    let is_prevented = differences.iter().any(|it| it.prevents_op);
+    let reached = main_device.activate(network.declaration()).map_err(|error| error.to_string());
+    let reached = reached.and_then(|mut it| it.wait_until_op(LIMIT).map_err(|error| error.to_string()));
+    assert_eq!(!is_prevented, reached.is_ok(), "{types:?} {kind:?}: {reached:?}: {differences:#?}");
+    differences
+}
+
+fn short(differences: &[Difference]) -> Vec<(DifferenceKind, bool, Option<u16>)> {
+    differences.iter().map(|it| (it.kind, it.prevents_op, it.position.map(|at| at.0))).collect()
+}
+
+const BUS: [&str; 3] = ["coupler", "servo=7", "digital-output-8"];
+
+// covers: network-file
+#[test]
+fn twins_of_a_declared_subdevice_prevent_op_and_both_are_named() {
+    for kind in KINDS {
+        let network = file_of(&BUS, kind, |file| kind.declare(&mut file.subdevice[1], 7));
+        assert_eq!(short(&checked(&network, &BUS, kind)), [], "{kind:?}");
+        let twins = ["coupler", "servo=7", "digital-output-8", "servo=7"];
+        let found = checked(&network, &twins, kind);
+        assert_eq!(short(&found), [(Additional, false, Some(3)), (Ambiguous, true, Some(1))], "{kind:?}: {found:#?}");
+        let expected =
+            format!("\"{}\": {} belongs to position 1 and to position 3", network.file.subdevice[1].name, kind.words());
+        assert_eq!(found[1].text, expected);
+        // The twin is another device, which is declared itself: nothing is additional.
+        let other = ["coupler", "servo=7", "digital-output-8=7"];
+        assert_eq!(short(&checked(&network, &other, kind)), [(Ambiguous, true, Some(1))], "{kind:?}");
+    }
+}
+
+// covers: network-file
+#[test]
+fn the_declared_device_is_compared_and_not_its_twin() {
+    let bus = ["coupler", "digital-output-8", "servo=7"];
+    for kind in KINDS {
+        let network = file_of(&bus, kind, |file| kind.declare(&mut file.subdevice[2], 7));
+        let before = ["coupler", "digital-output-8=7", "servo=7"];
+        assert_eq!(short(&checked(&network, &before, kind)), [(Ambiguous, true, Some(1))], "{kind:?}");
+    }
+}
+
+// covers: network-file, hot-connect
+#[test]
+fn twins_of_a_group_leave_it_absent_and_are_named_once() {
+    let bus = ["coupler", "digital-output-8", "servo=7", "digital-input-8"];
+    let grouped = |kind: Kind, required: Required| {
+        file_of(&bus, kind, move |file| {
+            for subdevice in &mut file.subdevice[2..] {
+                subdevice.group = Some("tool".to_owned());
+            }
+            kind.declare(&mut file.subdevice[2], 7);
+            file.required = required;
+        })
+    };
+    for kind in KINDS {
+        let network = grouped(kind, Required::Mandatory);
+        assert_eq!(short(&checked(&network, &bus, kind)), [], "{kind:?}");
+        let behind = ["coupler", "digital-output-8", "servo=7", "digital-input-8", "servo=7"];
+        let found = checked(&network, &behind, kind);
+        assert_eq!(short(&found), [(Additional, false, Some(4)), (Ambiguous, false, Some(2))], "{kind:?}: {found:#?}");
+        // Positions count the members of an ambiguous group.
+        let before = ["coupler", "servo=7", "digital-input-8", "digital-output-8", "servo=7"];
+        let found = checked(&network, &before, kind);
+        assert!(short(&found).contains(&(Ambiguous, true, Some(1))), "{kind:?}: {found:#?}");
+        let found = checked(&grouped(kind, Required::All), &behind, kind);
+        assert_eq!(short(&found), [(Additional, false, Some(4)), (Ambiguous, true, Some(2))], "{kind:?}: {found:#?}");
+        let found = checked(&network, &bus[..2], kind);
+        assert_eq!(short(&found), [(Missing, false, None); 2], "{kind:?}: {found:#?}");
+    }
+}
