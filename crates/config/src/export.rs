@@ -27,7 +27,8 @@ mod whole_bus;
 pub use details::{ExportDetails, SubDeviceDetails};
 pub use error::{ExportError, LeftOut};
 pub use options::{ExportOptions, LrwUse};
-pub(crate) use order::is_expressible;
+#[cfg(feature = "network")]
+pub(crate) use {checks::odd_limit, order::is_expressible};
 
 use crate::configuration::Configuration;
 use crate::eni::{self, Eni};

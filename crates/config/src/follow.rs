@@ -16,6 +16,7 @@ mod identity;
 mod image;
 mod mail;
 mod messages;
+mod names;
 mod notices;
 mod register_commands;
 mod registers;
@@ -51,6 +52,7 @@ pub fn follow(eni: &Eni) -> Result<Configuration, EniError> {
     let cyclic = cyclic::follow(eni, &bus, &mappings, &mut notices)?;
     let image = image::follow(eni, &mappings, &cyclic.covers, &mut notices)?;
     let clocks = clocks::of_segment(eni, &configs, &cyclic);
+    names::note_duplicates(eni, &mut notices);
     let facts = eni.subdevices.iter().zip(&bus.plugged_into).map(|(subdevice, plugged_into)| SubDeviceFacts {
         name: subdevice.name.clone(),
         station: subdevice.station,

@@ -9,6 +9,7 @@
 
 mod compare;
 mod configuration;
+mod declared_twice;
 pub mod eni;
 pub mod esi;
 mod export;

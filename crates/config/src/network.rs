@@ -8,9 +8,11 @@ mod declare;
 mod error;
 mod esi_differences;
 mod esi_names;
+mod export_error;
 mod from_esi;
 mod from_scan;
 pub mod model;
+mod places;
 mod read;
 #[cfg(test)]
 mod schema;

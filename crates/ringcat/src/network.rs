@@ -36,9 +36,10 @@ mod simulated;
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use ringcat_config::network::{MAX_NETWORK_BYTES, NetworkError};
-use ringcat_config::{Configuration, Stated};
+use ringcat_config::{Configuration, Export, ExportOptions, Stated};
 use ringcat_engine::main_device::Declaration;
 
 use crate::regular_file::read_at_most;
@@ -55,6 +56,8 @@ pub struct LoadedNetwork {
     pub file: NetworkFile,
     /// The configuration derived from it.
     pub configuration: Configuration,
+    /// The name and the text of the file, for messages.
+    source: Option<(String, Arc<str>)>,
 }
 
 /// Why a network file cannot be used.
@@ -112,13 +115,25 @@ impl LoadedNetwork {
     /// [`NetworkFailure::Content`]: with file, line and key.
     pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<LoadedNetwork, NetworkFailure> {
         let file = NetworkFile::read(name, bytes).map_err(|error| NetworkFailure::Content(Box::new(error)))?;
-        Ok(LoadedNetwork::new(file))
+        let source = std::str::from_utf8(bytes).ok().map(|text| (name.to_owned(), Arc::from(text)));
+        Ok(LoadedNetwork { source, ..LoadedNetwork::new(file) })
     }
 
     /// A network file that the application has made.
     pub fn new(file: NetworkFile) -> LoadedNetwork {
         let configuration = file.configuration();
-        LoadedNetwork { file, configuration }
+        LoadedNetwork { file, configuration, source: None }
+    }
+
+    /// The ENI of the network, as [`NetworkFile::to_eni`].
+    ///
+    /// # Errors
+    /// [`NetworkFailure::Content`]: what an ENI cannot express, with file, line and key; without a line for a network
+    /// that the application has made.
+    pub fn to_eni(&self, options: &ExportOptions) -> Result<Export, NetworkFailure> {
+        let (name, text) = self.source.as_ref().map_or(("network file", ""), |(name, text)| (name, text));
+        let failed = |error| NetworkFailure::Content(Box::new(NetworkError::of_export(name, text, &error)));
+        self.file.to_eni(options).map_err(failed)
     }
 
     /// The declaration to activate.

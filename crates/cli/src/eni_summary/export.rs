@@ -158,7 +158,7 @@ fn made(arguments: &ExportArguments) -> Result<Export, Failure> {
     let failed = |path: &Path, error: ExportError| Failure::new(format!("{}: {error}", path.display()));
     if let Some(path) = &arguments.network {
         let network = LoadedNetwork::load(path).map_err(|error| Failure::new(error.to_string()))?;
-        return network.file.to_eni(&options).map_err(|error| failed(path, error));
+        return network.to_eni(&options).map_err(|error| Failure::new(error.to_string()));
     }
     let path = arguments.eni.as_deref().ok_or_else(|| Failure::new("expected --network FILE or --eni FILE"))?;
     let file = EniFile::load(path).map_err(|error| Failure::new(error.to_string()))?;

@@ -14,12 +14,20 @@ pub struct ExportError {
     pub what: String,
     /// The reason.
     pub reason: String,
+    /// The key that has the setting in a network file, within the SubDevice if there is one, as in
+    /// `sync_manager[1].start`; empty if no single key has it.
+    pub key: String,
 }
 
 impl ExportError {
     /// About the whole network.
     pub(crate) fn whole(what: impl Into<String>, reason: impl Into<String>) -> ExportError {
-        ExportError { subdevice: None, what: what.into(), reason: reason.into() }
+        ExportError { subdevice: None, what: what.into(), reason: reason.into(), key: String::new() }
+    }
+
+    /// With the key of a network file.
+    pub(crate) fn at(self, key: impl Into<String>) -> ExportError {
+        ExportError { key: key.into(), ..self }
     }
 
     /// About a SubDevice.
@@ -30,7 +38,8 @@ impl ExportError {
         reason: impl Into<String>,
     ) -> ExportError {
         let name = configuration.subdevices.get(index).map(|facts| facts.name.clone()).unwrap_or_default();
-        ExportError { subdevice: Some((index, name)), what: what.into(), reason: reason.into() }
+        let subdevice = Some((index, name));
+        ExportError { subdevice, what: what.into(), reason: reason.into(), key: String::new() }
     }
 }
 

@@ -37,6 +37,7 @@ pub(super) const fn section(action: &StartupAction) -> Option<Section> {
 }
 
 /// Whether an ENI can have these commands in their order.
+#[cfg(feature = "network")]
 pub(crate) fn is_expressible(commands: &[StartupCommand]) -> bool {
     order(commands).is_some()
 }

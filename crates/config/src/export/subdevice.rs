@@ -24,7 +24,7 @@ pub(super) fn subdevice(
         let reason = "commands to registers and commands of mailbox protocols alternate: an ENI has each kind in a \
                       list of its own. At PS the commands that assign PDOs are among those of CoE, after those \
                       without `after_pdos`";
-        ExportError::of(whole, index, "start-up commands", reason)
+        ExportError::of(whole, index, "start-up commands", reason).at("startup")
     })?;
     let station = facts.station.unwrap_or_default();
     let auto_increment = auto_increment(whole, index);

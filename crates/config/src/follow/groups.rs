@@ -1,41 +1,86 @@
-//! Hot connect groups: the head is identified by alias or identification, its members follow it (protocol 8.2).
+//! Hot connect groups: the head is identified by alias, identification or data word, its members follow it
+//! (protocol 8.2).
+
+use std::collections::HashMap;
 
 use ringcat_engine::config::{ConfigAddress, SubDeviceConfig};
-use ringcat_engine::main_device::GroupId;
+use ringcat_engine::main_device::{GroupId, Required};
 
 use super::bus::Bus;
-use super::identity::{Mark, group_mark};
-use super::messages::contradiction;
-use crate::eni::{Eni, EniError};
+use super::identity::{Mark, group_marks};
+use super::messages::{contradiction, label};
+use crate::declared_twice::declared_twice;
+use crate::eni::{Eni, EniError, HotConnect, Place, quoted};
 
 /// Declares the groups in `configs`; returns their names.
 pub(super) fn follow(eni: &Eni, bus: &Bus, configs: &mut [SubDeviceConfig]) -> Result<Vec<String>, EniError> {
     let mut names = Vec::new();
+    let mut heads: HashMap<&str, usize> = HashMap::new();
     for (index, subdevice) in eni.subdevices.iter().enumerate() {
         let Some(group) = &subdevice.hot_connect else { continue };
-        let mark = group_mark(&group.identify);
-        let address = |offset| match mark {
-            Some(Mark::Alias(alias)) if alias != 0 => Ok(ConfigAddress::Alias { alias, offset }),
-            Some(Mark::DataWord { register, value }) => Ok(ConfigAddress::DataWord { register, value, offset }),
-            Some(Mark::Identification(value)) => Ok(ConfigAddress::Identification { value, offset }),
-            Some(Mark::Alias(_) | Mark::Eeprom { .. } | Mark::EepromWord { .. }) | None => {
-                let what = format!("identification of the hot connect group {}", crate::eni::quoted(&group.name));
-                let expected = "an IdentifyCmd that compares the alias (register 0x0012 or EEPROM word 4), the \
-                                identification (register 0x0134) or a whole data word (from 0x0F00)";
-                let got = format!("{} commands, none of that kind", group.identify.len());
-                let hint = "RingCAT does not support other kinds of identification";
-                Err(contradiction(eni, index, group.place, what, expected, got, hint))
-            }
-        };
+        let head = head(eni, index, group)?;
         let number = names.len();
         for (offset, member) in (0..group.members).zip(index..) {
             debug_assert_eq!(bus.groups[member], Some(number));
             let config = &mut configs[member];
-            config.address = address(offset)?;
+            config.address = head.behind(offset);
             config.optional = true;
             config.group = Some(GroupId(number));
         }
+        if let Some(first) = heads.insert(&group.name, index).filter(|_| !group.name.is_empty()) {
+            let got = format!("{}, which the group of {} also has", quoted(&group.name), label(eni, first));
+            return Err(contradiction(eni, index, group.place, "GroupName", "a name of its own", got, ""));
+        }
         names.push(group.name.clone());
     }
+    each_once(eni, configs)?;
     Ok(names)
+}
+
+/// The address of the head of a group.
+fn head(eni: &Eni, index: usize, group: &HotConnect) -> Result<ConfigAddress, EniError> {
+    let marks = group_marks(&group.identify);
+    let refused = |place: Place, expected: &str, got: String, hint: &str| {
+        let what = format!("identification of the hot connect group {}", quoted(&group.name));
+        contradiction(eni, index, place, what, expected, got, hint)
+    };
+    let addresses: Vec<(ConfigAddress, Place)> =
+        marks.iter().filter_map(|(mark, place)| Some((address(*mark)?, *place))).collect();
+    match addresses[..] {
+        [] => {
+            let expected = "an IdentifyCmd that compares the alias (register 0x0012 or EEPROM word 4), the \
+                            identification (register 0x0134) or a whole data word (from 0x0F00)";
+            let got = format!("{} commands, none of that kind", group.identify.len());
+            Err(refused(group.place, expected, got, "RingCAT does not support other kinds of identification"))
+        }
+        [(address, _)] => Ok(address),
+        [(first, _), (second, place), ..] => {
+            let expected = "one alias, identification or data word that is compared";
+            let got = format!("{} and {}", first.mark(), second.mark());
+            Err(refused(place, expected, got, "RingCAT finds a group by one of them"))
+        }
+    }
+}
+
+fn address(mark: Mark) -> Option<ConfigAddress> {
+    let offset = 0;
+    match mark {
+        Mark::Alias(alias) if alias != 0 => Some(ConfigAddress::Alias { alias, offset }),
+        Mark::DataWord { register, value } => Some(ConfigAddress::DataWord { register, value, offset }),
+        Mark::Identification(value) => Some(ConfigAddress::Identification { value, offset }),
+        Mark::Alias(_) | Mark::Eeprom { .. } | Mark::EepromWord { .. } => None,
+    }
+}
+
+/// Two groups with one alias, identification or data word are refused unless their SubDevices exclude each other.
+fn each_once(eni: &Eni, configs: &[SubDeviceConfig]) -> Result<(), EniError> {
+    let Some((first, second)) = declared_twice(configs, Required::default()) else { return Ok(()) };
+    let group = (0..=second).rev().find_map(|index| Some((index, eni.subdevices[index].hot_connect.as_ref()?)));
+    let (index, place, name) = match group {
+        Some((index, group)) => (index, group.place, group.name.as_str()),
+        None => (second, eni.subdevices[second].place, ""),
+    };
+    let what = format!("identification of the hot connect group {}", quoted(name));
+    let got = format!("{}, which {} also has", configs[second].address, label(eni, first));
+    Err(contradiction(eni, index, place, what, "one that no other group has", got, ""))
 }

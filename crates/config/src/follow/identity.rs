@@ -165,15 +165,23 @@ pub(super) fn is_eeprom_address(command: &EcatCommand) -> bool {
     (ado == map::SII_CONTROL || ado == map::SII_ADDRESS) && command.datagram.command.writes()
 }
 
-/// The alias, identification or data word of a group; an alias may be read from the EEPROM or from its register.
-pub(super) fn group_mark(commands: &[EcatCommand]) -> Option<Mark> {
-    marks(commands).into_iter().find_map(|(mark, whole, _)| match mark {
-        Mark::Eeprom { word: WORD_ALIAS, value } => Some(Mark::Alias(value as u16)),
-        Mark::EepromWord { word: WORD_ALIAS, value } => Some(Mark::Alias(value)),
-        Mark::Eeprom { .. } | Mark::EepromWord { .. } => None,
-        Mark::Alias(_) | Mark::Identification(_) | Mark::DataWord { .. } if whole => Some(mark),
-        Mark::Alias(_) | Mark::Identification(_) | Mark::DataWord { .. } => None,
-    })
+/// The aliases, identifications and data words that the commands of a group compare, each once; an alias may be read
+/// from the EEPROM or from its register.
+pub(super) fn group_marks(commands: &[EcatCommand]) -> Vec<(Mark, Place)> {
+    let mut found: Vec<(Mark, Place)> = Vec::new();
+    for (mark, whole, place) in marks(commands) {
+        let mark = match mark {
+            Mark::Eeprom { word: WORD_ALIAS, value } => Mark::Alias(value as u16),
+            Mark::EepromWord { word: WORD_ALIAS, value } if whole => Mark::Alias(value),
+            Mark::Eeprom { .. } | Mark::EepromWord { .. } => continue,
+            Mark::Alias(_) | Mark::Identification(_) | Mark::DataWord { .. } if whole => mark,
+            Mark::Alias(_) | Mark::Identification(_) | Mark::DataWord { .. } => continue,
+        };
+        if found.iter().all(|(known, _)| *known != mark) {
+            found.push((mark, place));
+        }
+    }
+    found
 }
 
 /// Whether the PDI keeps the EEPROM in PREOP: assigned to the PDI at IP and not taken back.

@@ -1,12 +1,12 @@
 //! What the values of a network file say together: names that are unique and known, places, lengths, start-up commands.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use ringcat_engine::config::MailMessage;
 
 use super::error::{Fault, Step};
 use super::model::{At, Junctions, NetworkFile, Startup, SubDevice, SyncManager};
-use super::write::next_position;
+use super::places;
 
 /// Maximum number of SubDevices: positions have 16 bits, and the last one is reserved.
 const MAX_SUBDEVICES: usize = 65_534;
@@ -27,9 +27,9 @@ const DATA_WORDS: std::ops::RangeInclusive<u16> = 0x0F00..=0xFFFE;
 /// Bytes of an IP host name.
 const HOST_NAME: usize = 32;
 
-type Checked = Result<(), Fault>;
+pub(super) type Checked = Result<(), Fault>;
 
-fn fault<const N: usize>(path: [Step; N], message: impl Into<String>) -> Checked {
+pub(super) fn fault<const N: usize>(path: [Step; N], message: impl Into<String>) -> Checked {
     Err(Fault { path: path.into(), message: message.into() })
 }
 
@@ -39,8 +39,8 @@ pub(super) fn check(file: &NetworkFile) -> Checked {
     let names = names(file)?;
     clocks(file, &names)?;
     redundancy(file, &names)?;
-    groups(file)?;
-    positions(file)?;
+    places::groups(file)?;
+    places::positions(file)?;
     cables(file)?;
     for (index, subdevice) in file.subdevice.iter().enumerate() {
         of_subdevice(file, index, subdevice, &names).map_err(|fault| {
@@ -49,7 +49,7 @@ pub(super) fn check(file: &NetworkFile) -> Checked {
             Fault { path, ..fault }
         })?;
     }
-    Ok(())
+    places::marks(file)
 }
 
 fn domains(file: &NetworkFile) -> Checked {
@@ -158,55 +158,6 @@ fn redundancy(file: &NetworkFile, names: &BTreeMap<&str, usize>) -> Checked {
                 return Err(Fault { path: at(key), message: format!("expected a port from 0 to 3, got {port}") });
             }
         }
-    }
-    Ok(())
-}
-
-/// Members of a group follow each other; its head is found by alias or identification.
-fn groups(file: &NetworkFile) -> Checked {
-    let mut ended: BTreeSet<&str> = BTreeSet::new();
-    let mut open: Option<&str> = None;
-    for (index, subdevice) in file.subdevice.iter().enumerate() {
-        let at = |key: &str| ["subdevice".into(), index.into(), key.into()];
-        let group = subdevice.group.as_deref();
-        let has_place = subdevice.position.is_some() || subdevice.alias.is_some() || subdevice.identification.is_some();
-        if group == open {
-            if group.is_some() && has_place {
-                return fault(at("group"), "a further member of a group follows its head: expected no place");
-            }
-            continue;
-        }
-        ended.extend(open);
-        open = group;
-        let Some(group) = group else { continue };
-        if group.is_empty() {
-            return fault(at("group"), "expected a name, got an empty text");
-        }
-        if ended.contains(group) {
-            return fault(at("group"), format!("the members of group \"{group}\" must follow each other"));
-        }
-        let by_mark = subdevice.alias.is_some_and(|alias| alias != 0) || subdevice.identification.is_some();
-        if !by_mark || subdevice.offset.unwrap_or(0) != 0 {
-            let message = format!("the head of group \"{group}\" needs an alias or an identification, without offset");
-            return fault(at("group"), message);
-        }
-    }
-    Ok(())
-}
-
-/// Each SubDevice that is found by its position has one of its own.
-fn positions(file: &NetworkFile) -> Checked {
-    let (mut known, mut next) = (BTreeMap::new(), 0);
-    for (index, subdevice) in file.subdevice.iter().enumerate() {
-        let is_marked = subdevice.alias.is_some() || subdevice.identification.is_some();
-        if subdevice.group.is_none() && !is_marked {
-            let own = subdevice.position.unwrap_or(next);
-            if let Some(first) = known.insert(own, index) {
-                let message = format!("{own} is also the position of subdevice[{first}]");
-                return fault(["subdevice".into(), index.into(), "position".into()], message);
-            }
-        }
-        next = next_position(next, subdevice);
     }
     Ok(())
 }

@@ -39,23 +39,15 @@ impl NetworkFile {
     /// it lacks are ignored.
     pub fn configuration(&self) -> Configuration {
         let index: HashMap<&str, usize> = (0..).zip(&self.subdevice).map(|(at, it)| (it.name.as_str(), at)).collect();
-        let (groups, mut configs) = self.configs();
-        for (config, subdevice) in configs.iter_mut().zip(&self.subdevice) {
-            fill(config, subdevice);
-        }
         let mut declaration = Declaration::default().with_clocks(self.clocks(&index));
-        declaration.subdevices = configs;
+        declaration.subdevices = self.declared();
         declaration.domains = self.domains();
         declaration.lrw = match self.lrw {
             Lrw::Automatic => LrwPolicy::Automatic,
             Lrw::Always => LrwPolicy::Explicit,
             Lrw::PerSubdevice => LrwPolicy::PerSubDevice,
         };
-        declaration.required = match self.required {
-            model::Required::All => Required::All,
-            model::Required::Mandatory => Required::Mandatory,
-            model::Required::Nothing => Required::Nothing,
-        };
+        declaration.required = self.declared_required();
         let facts = |subdevice: &SubDevice| SubDeviceFacts {
             name: subdevice.name.clone(),
             station: None,
@@ -68,7 +60,7 @@ impl NetworkFile {
         Configuration {
             declaration,
             subdevices: self.subdevice.iter().map(facts).collect(),
-            groups,
+            groups: self.configs().0,
             image: self.image(),
             cycle: self.domain.iter().map(|domain| domain.period.0).min(),
             notices: Vec::new(),
@@ -77,6 +69,24 @@ impl NetworkFile {
                 junctions: self.junction_mode(),
                 connections: self.junction_connections(),
             },
+        }
+    }
+
+    /// The SubDevices as declared.
+    pub(super) fn declared(&self) -> Vec<SubDeviceConfig> {
+        let (_, mut configs) = self.configs();
+        for (config, subdevice) in configs.iter_mut().zip(&self.subdevice) {
+            fill(config, subdevice);
+        }
+        configs
+    }
+
+    /// The absent SubDevices that prevent the activation.
+    pub(super) const fn declared_required(&self) -> Required {
+        match self.required {
+            model::Required::All => Required::All,
+            model::Required::Mandatory => Required::Mandatory,
+            model::Required::Nothing => Required::Nothing,
         }
     }
 

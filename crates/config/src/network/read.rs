@@ -129,8 +129,8 @@ fn no_array(value: &DeValue<'_>, path: &mut Vec<Step>) -> Result<(), Fault> {
     }
 }
 
-/// The error of a fault, with the line of its key or of the nearest table that contains it.
-fn placed(name: &str, text: &str, root: &DeTable<'_>, fault: &Fault) -> NetworkError {
+/// The error of a key, with its line or that of the nearest table that contains it.
+pub(super) fn placed(name: &str, text: &str, root: &DeTable<'_>, fault: &Fault) -> NetworkError {
     let line = place_of(root, &fault.path).map(|span| line_of(text, span.start));
     NetworkError {
         file: name.to_owned(),

@@ -14,7 +14,7 @@ use ringcat_wire::register::{SyncManager as Register, SyncManagerActivate, SyncM
 use super::model::{self, Buffer, Lrw, NetworkFile, SubDevice, SyncManager};
 use crate::configuration::{Configuration, ImageArea};
 use crate::eni;
-use crate::export::{Export, ExportDetails, ExportError, ExportOptions, LeftOut, SubDeviceDetails, export};
+use crate::export::{Export, ExportDetails, ExportError, ExportOptions, LeftOut, SubDeviceDetails, export, odd_limit};
 
 /// Control bytes of mailboxes (protocol 3.11).
 const MAILBOX_OUT: u8 = 0x26;
@@ -42,10 +42,12 @@ impl NetworkFile {
         let mut configuration = self.configuration();
         let mut left_out = of_file(self);
         for (index, of) in self.subdevice.iter().enumerate() {
+            limits(&configuration, index, of)?;
             let declared = declared(&configuration, index, of)?;
             let placed = pdos::place(&configuration.declaration.subdevices[index].startup, of);
             if let Some(undone) = placed.undone(&declared) {
-                return Err(ExportError::of(&configuration, index, "start-up commands", undone.to_string()));
+                let refused = ExportError::of(&configuration, index, "start-up commands", undone.to_string());
+                return Err(refused.at("startup"));
             }
             if !placed.is_exact {
                 let reason = "an ENI has the commands of each protocol, and those to registers, in lists of their own: \
@@ -88,6 +90,17 @@ impl NetworkFile {
         };
         let subdevices = self.subdevice.iter().map(of).collect();
         ExportDetails { name: self.name.clone(), subdevices, tasks }
+    }
+}
+
+/// Time limits of start-up commands that an ENI can have.
+fn limits(configuration: &Configuration, index: usize, of: &SubDevice) -> Result<(), ExportError> {
+    let mut odd = of.startup.iter().enumerate().filter_map(|(at, it)| Some((at, odd_limit(it.limit?.0)?)));
+    match odd.next() {
+        Some((at, reason)) => {
+            Err(ExportError::of(configuration, index, "time limit", reason).at(format!("startup[{at}].limit")))
+        }
+        None => Ok(()),
     }
 }
 
@@ -169,9 +182,10 @@ fn declared(
         found.push(buffer(0, SyncManagerRole::MailboxOut, mailbox.write, MAILBOX_OUT));
         found.push(buffer(1, SyncManagerRole::MailboxIn, mailbox.read, MAILBOX_IN));
     }
-    for it in &of.sync_manager {
+    for (at, it) in of.sync_manager.iter().enumerate() {
         let refused = |reason: &str| {
-            ExportError::of(configuration, index, format!("SyncManager {}", it.number), reason.to_owned())
+            let what = format!("SyncManager {}", it.number);
+            ExportError::of(configuration, index, what, reason.to_owned()).at(format!("sync_manager[{at}]"))
         };
         if found.iter().any(|other| other.index == it.number) {
             return Err(refused("a mailbox uses it"));
@@ -315,14 +329,14 @@ fn reference(configuration: &mut Configuration, left_out: &mut Vec<LeftOut>) -> 
     let Some(clocks) = &mut configuration.declaration.clocks else {
         let Some(index) = first else { return Ok(()) };
         let reason = "they need the distributed clocks: add a table `[clocks]`";
-        return Err(ExportError::of(configuration, index, "SYNC signals", reason));
+        return Err(ExportError::of(configuration, index, "SYNC signals", reason).at("sync"));
     };
     if matches!(clocks.reference, ReferenceClock::Declared(_)) {
         return Ok(());
     }
     let Some(index) = first else {
         let reason = "an ENI names the SubDevice with the reference clock: add `reference` to the table `[clocks]`";
-        return Err(ExportError::whole("clocks", reason));
+        return Err(ExportError::whole("clocks", reason).at("clocks"));
     };
     clocks.reference = ReferenceClock::Declared(SubDeviceId(index));
     let reason = "the file names no reference clock: in the ENI it is this SubDevice, the first with SYNC signals";

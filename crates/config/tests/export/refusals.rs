@@ -1,7 +1,7 @@
 //! What an ENI cannot express: refused with SubDevice, setting and reason, or listed.
 
 use ringcat_config::network::model::{Sdo, Startup, SubDevice, SyncManager, Target};
-use ringcat_config::network::{Bytes, NetworkFile, Time};
+use ringcat_config::network::{Bytes, NetworkError, NetworkFile, Time};
 use ringcat_config::{Configuration, ExportDetails, ExportOptions, export};
 use ringcat_engine::config::{RegisterAccess, RegisterCommand, StartupAction, StartupCommand, Transition};
 use ringcat_wire::address::RegisterAddress;
@@ -39,6 +39,30 @@ fn settings_without_which_another_network_results_are_refused_by_name() {
     );
     expect(refusal(|file| file.domain[0].period = Time(std::time::Duration::from_nanos(1_500))), "domain: 1.5µs");
     expect(refusal(|file| file.clocks = None), &format!("{drive}SYNC signals"));
+}
+
+/// A text of the file, what takes its place, the line and the rest of the error.
+const REFUSED: [(&str, &str, &str); 8] = [
+    ("check_revision = \"equal\"", "target = \"PREOP\"", "28: SubDevice \"Drive\": subdevice[1].target: PREOP: an ENI"),
+    ("serial = 77", "alias = 7", "29: SubDevice \"Drive\": subdevice[1].alias: an alias or an identification"),
+    ("serial = 77", "identification = 7", "29: SubDevice \"Drive\": subdevice[1].identification: an alias or an"),
+    ("serial = 77", "check_identification = 7", "29: SubDevice \"Drive\": subdevice[1].check_identification: an ENI"),
+    ("start = 0x1200\n", "", "47: SubDevice \"Drive\": subdevice[1].sync_manager[0]: an ENI needs its `start`"),
+    ("number = 3", "number = 1", "63: SubDevice \"Drive\": subdevice[1].sync_manager[1]: a mailbox uses it"),
+    ("\"1ms\"", "\"1000500ns\"", "10: domain[0].period: 1.0005ms: a cycle time of an ENI"),
+    ("limit = \"3s\"", "limit = \"1500us\"", "89: SubDevice \"Drive\": subdevice[1].startup[0].limit: 1.5ms: a time"),
+];
+
+// covers: eni-run, network-file
+#[test]
+fn refusals_of_a_network_file_have_the_line_of_the_key() {
+    for (from, to, expected) in REFUSED {
+        let text = CELL.replacen(from, to, 1);
+        assert_ne!(text, CELL, "{from}");
+        let error = network(&text).to_eni(&ExportOptions::default()).expect_err("an ENI cannot express it");
+        let error = NetworkError::of_export("cell.toml", &text, &error).to_string();
+        assert!(error.starts_with(&format!("cell.toml:{expected}")), "{from} -> {to}: {error}");
+    }
 }
 
 // covers: eni-run

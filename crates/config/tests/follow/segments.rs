@@ -6,7 +6,7 @@ use ringcat_engine::declared::{GroupId, SubDeviceId};
 use ringcat_engine::info::Direction;
 use ringcat_wire::address::{RegisterAddress, StationAddress};
 
-use crate::{SMALL, changed, configured, has_notice, refused};
+use crate::{SMALL, changed, configured, has_notice, refusal, refused, with};
 
 fn addresses(configuration: &ringcat_config::Configuration) -> Vec<ConfigAddress> {
     configuration.declaration.subdevices.iter().map(|config| config.address).collect()
@@ -89,7 +89,73 @@ fn a_group_that_cannot_be_found_or_is_not_complete_is_refused() {
     assert!(word.contains("identification of the hot connect group \"Gripper\""), "{word}");
     assert!(word.contains("other kinds of identification"), "{word}");
     let long = refused(&[(HEAD, &GROUP.replace(">2</GroupMemberCnt>", ">9</GroupMemberCnt>"))]);
-    assert!(long.contains("expected 9, got 3"), "{long}");
+    assert!(long.contains("expected 9, got 3") && long.contains("line "), "{long}");
+    // The last member alone is missing.
+    let last = refused(&[(HEAD, &GROUP.replace(">2</GroupMemberCnt>", ">4</GroupMemberCnt>"))]);
+    assert!(last.contains("members of the hot connect group: expected 4, got 3"), "{last}");
+}
+
+/// The file with one group of one SubDevice, "Gripper", and a second one, whose name and mark are these.
+fn two_groups(name: &str, ado: u16, value: &str) -> String {
+    let group = GROUP.replace(">2</GroupMemberCnt>", ">1</GroupMemberCnt>");
+    let second = group.replace("Gripper", name).replace("<Ado>18</Ado>", &format!("<Ado>{ado}</Ado>"));
+    let second = second.replace("<Data>3412</Data>", &format!("<Data>{value}</Data>"));
+    let third = "<PreviousPort Selected=\"1\"><Port>B</Port><PhysAddr>1002</PhysAddr></PreviousPort>";
+    with(&[(HEAD, &group), (third, &second)])
+}
+
+// covers: 8.2, hot-connect, eni-image
+#[test]
+fn two_groups_with_one_mark_or_name_are_refused_with_the_line() {
+    configured(&two_groups("Tool", 18, "3512"));
+    configured(&two_groups("Tool", 308, "3412"));
+    for (ado, mark) in [(18, "alias 4660"), (308, "identification 4660"), (4096, "data word 4660 at 0x1000")] {
+        let text = two_groups("Tool", ado, "3412").replace("<Ado>18</Ado>", &format!("<Ado>{ado}</Ado>"));
+        let error = refusal(&text);
+        let expected = format!("expected one that no other group has, got {mark} offset 0, which Slave 2 \"Left\"");
+        assert!(error.contains("Slave 3 \"Right\"") && error.contains(&expected), "{error}");
+        assert!(error.contains("line 51,"), "{error}");
+    }
+    let error = refusal(&two_groups("Gripper", 18, "3512"));
+    assert!(
+        error.contains("GroupName") && error.contains("\"Gripper\", which the group of Slave 2 \"Left\""),
+        "{error}"
+    );
+    assert!(error.contains("line 51,"), "{error}");
+    configured(&two_groups("", 18, "3512").replace("<GroupName>Gripper</GroupName>", ""));
+}
+
+// covers: 8.2, hot-connect, eni-image
+#[test]
+fn a_group_with_several_marks_is_refused_with_the_line_of_the_second() {
+    let command = &GROUP[GROUP.find("<IdentifyCmd>").expect("a command")..GROUP.find("</HotConnect>").expect("an end")];
+    let twice = |second: &str| with(&[(HEAD, &GROUP.replace("</HotConnect>", &format!("{second}</HotConnect>")))]);
+    configured(&twice(command));
+    let word = |ado: u16| command.replace("<Ado>18</Ado>", &format!("\n<Ado>{ado}</Ado>"));
+    for (ado, mark) in [(308, "identification 4660"), (3864, "data word 4660 at 0x0f18")] {
+        let error = refusal(&twice(&word(ado)));
+        let expected =
+            format!("expected one alias, identification or data word that is compared, got alias 4660 and {mark}");
+        assert!(error.contains(&expected) && error.contains("line "), "{error}");
+    }
+    let words = GROUP.replace("<Ado>18</Ado>", "<Ado>3864</Ado>");
+    let words = words.replace("</HotConnect>", &format!("{}</HotConnect>", word(4096)));
+    let error = refused(&[(HEAD, &words)]);
+    assert!(error.contains("got data word 4660 at 0x0f18 and data word 4660 at 0x1000"), "{error}");
+}
+
+// covers: eni-image
+#[test]
+fn names_of_several_subdevices_or_variables_are_noted() {
+    assert!(!has_notice(&configured(SMALL), &["of several"]));
+    let text = SMALL.replace("<Name>Right</Name>", "<Name>Left</Name>");
+    assert!(has_notice(
+        &configured(&text),
+        &["a name of several SubDevices (\"Left\")", "the first one in the file (line"]
+    ));
+    let names: Vec<String> = configured(SMALL).image.variables.iter().map(|it| it.name.clone()).collect();
+    let text = SMALL.replace(&format!("<Name>{}</Name>", names[1]), &format!("<Name>{}</Name>", names[0]));
+    assert!(has_notice(&configured(&text), &["a name of several variables", &names[0]]));
 }
 
 // covers: 7, eni-image

@@ -82,6 +82,11 @@ const CHANGES: &[(&str, &str, &str)] = &[
         "subdevice[1].sync_manager[0].pdo[0].entries[2].bits: expected 1 to 255 bits, got 0",
     ),
     ("under_way = 2", "under_way = 5", "domain[0].under_way: expected 1 to 4, got 5"),
+    (
+        "identification = 9\nidentification_word = 0x1000\noffset = 2\n",
+        "alias = 5\noffset = 1\n",
+        "SubDevice \"Switch\": subdevice[4].alias: alias 5 offset 1 is also the place of subdevice[3]",
+    ),
     ("alias = 5\n", "", "subdevice[2].group: the head of group \"tool 1\" needs an alias or an identification"),
     ("identification = 9\n", "alias = 9\n", "subdevice[4].identification_word: expected a key identification"),
     ("identification_word = 0x1000", "identification_word = 0x0e00", "expected an address from 0x0F00 to 0xFFFE"),
@@ -223,4 +228,59 @@ fn two_subdevices_at_one_port_are_refused_unless_they_take_turns() {
     let error = refusal(file(""));
     assert!(error.contains("subdevice[2].plugged_into: subdevice[1] is plugged into this port too"), "{error}");
     NetworkFile::read("turns.toml", file("optional = true").as_bytes()).expect("one of them may be absent");
+}
+
+/// A file of SubDevices with these keys, in an order with lines of their own.
+fn marked(subdevices: &[&str]) -> String {
+    let head = "ringcat_network = 1\n[[domain]]\nname = \"d\"\nperiod = \"1ms\"\n";
+    let subdevices = subdevices.iter().enumerate();
+    let tables = subdevices.map(|(at, keys)| format!("[[subdevice]]\nname = \"{at}\"\n{}\n", keys.replace("; ", "\n")));
+    format!("{head}{}", tables.collect::<String>())
+}
+
+// covers: network-file
+#[test]
+fn a_mark_that_two_subdevices_have_is_refused_with_its_line() {
+    let word = "identification = 7; identification_word = 0x1000";
+    for (mark, shown, key) in [
+        ("alias = 7", "alias 7", "alias"),
+        ("identification = 7", "identification 7", "identification"),
+        (word, "data word 7 at 0x1000", "identification"),
+        ("alias = 0; offset = 7", "alias 0", "alias"),
+    ] {
+        let offset = if mark.contains("offset") { 7 } else { 0 };
+        let text = marked(&[mark, "vendor = 2", mark]);
+        let line = 13 + mark.matches(';').count();
+        let expected = format!(
+            "bad.toml:{line}: SubDevice \"2\": subdevice[2].{key}: {shown} offset {offset} is also the place of subdevice[0]"
+        );
+        assert_eq!(refusal(text), expected);
+        if offset > 0 {
+            continue;
+        }
+        let [one, two] = ["a", "b"].map(|name| format!("{mark}; group = \"{name}\""));
+        assert!(refusal(marked(&[&one, &two])).contains("is also the place of subdevice[0]"), "{mark}");
+        // Behind the head of a group.
+        let behind = format!("{mark}; offset = 1");
+        assert!(
+            refusal(marked(&[&one, "group = \"a\"", &behind])).contains("is also the place of subdevice[1]"),
+            "{mark}"
+        );
+        let accepted =
+            |text: String| NetworkFile::read("good.toml", text.as_bytes()).map_err(|error| error.to_string());
+        assert!(accepted(marked(&[mark, &behind])).is_ok(), "{mark}");
+        // They take turns: no SubDevice can be both.
+        let [two, three] =
+            ["product = 2; group = \"b\"", "product = 3; group = \"c\""].map(|it| format!("{mark}; {it}"));
+        accepted(marked(&[&two, &three])).unwrap_or_else(|error| panic!("{error}"));
+        let [two, three] = [2, 3].map(|product| format!("{mark}; product = {product}"));
+        assert!(accepted(marked(&[&two, &three])).is_err(), "both are mandatory");
+        let nothing = marked(&[&two, &three]).replacen("= 1\n", "= 1\nrequired = \"nothing\"\n", 1);
+        assert!(accepted(nothing).is_ok(), "{mark}");
+    }
+    let twice = refusal(marked(&["alias = 7; group = \"a\"", "alias = 8; group = \"b\"", "alias = 9; group = \"a\""]));
+    assert_eq!(
+        twice,
+        "bad.toml:16: SubDevice \"2\": subdevice[2].group: the members of group \"a\" must follow each other"
+    );
 }

@@ -201,10 +201,10 @@ impl EniImage {
         &self.variables
     }
 
-    /// The variable with this name; any one of them if the name is not unique.
+    /// The variable with this name; the first one of the file if the name is not unique.
     pub fn variable(&self, name: &str) -> Option<&EniVariable> {
-        let found = self.by_name.binary_search_by(|number| self.variables[*number].name.as_str().cmp(name)).ok()?;
-        self.variables.get(self.by_name[found])
+        let first = self.by_name.partition_point(|number| self.variables[*number].name.as_str() < name);
+        self.by_name.get(first).and_then(|number| self.variables.get(*number)).filter(|found| found.name == name)
     }
 
     /// The first 64 bits of a variable, zero-extended.
