@@ -40,9 +40,9 @@ pub struct ClockOptions {
     pub bus_shift: bool,
     /// Reference clock: first, sync or a position
     ///
-    /// first is the first SubDevice with a clock, sync the first one with SYNC signals.
-    #[arg(long, value_name = "CLOCK", default_value = "first", value_parser = reference)]
-    reference: ReferenceClock,
+    /// first is the first SubDevice with a clock, sync the first one with SYNC signals; first by default.
+    #[arg(long, value_name = "CLOCK", value_parser = reference)]
+    reference: Option<ReferenceClock>,
     /// Write estimates for propagation delays that cannot be measured
     ///
     /// A fork without a clock hides the delay of the SubDevices behind it. The estimate is the middle of the possible
@@ -69,7 +69,7 @@ impl ClockOptions {
     /// Whether one of them is given: clocks are then in use.
     pub fn are_given(&self) -> bool {
         let given = self.phase.is_some() || self.bus_shift || self.estimate_delays || !self.sync.is_empty();
-        given || self.reference != ReferenceClock::default()
+        given || self.reference.is_some()
     }
 
     /// Declares the clocks of a segment whose SubDevices are declared in the order of the scan.
@@ -85,11 +85,11 @@ impl ClockOptions {
         }
         let epoch = system_time::epoch(now());
         let config = ClockConfig::default()
-            .with_reference(self.reference)
+            .with_reference(self.reference.unwrap_or_default())
             .with_bus_shift(self.bus_shift)
             .with_estimated_delays(self.estimate_delays)
             .with_epoch(epoch);
-        if let Some(words) = in_front(self.reference, found, declaration) {
+        if let Some(words) = in_front(self.reference.unwrap_or_default(), found, declaration) {
             warn(words);
         }
         declaration.clocks = Some(config);
@@ -104,7 +104,7 @@ impl ClockOptions {
                 us(phase)
             ));
         }
-        match self.reference {
+        match self.reference.unwrap_or_default() {
             ReferenceClock::FirstConfigured if signals.iter().any(Option::is_some) => Ok(()),
             ReferenceClock::FirstConfigured => {
                 Err("--reference sync: no SubDevice has SYNC signals; add --sync".into())
@@ -122,19 +122,28 @@ impl ClockOptions {
         }
     }
 
-    /// As [`ClockOptions::declare`] for the declaration of an ENI: SYNC signals and the reference are those of the
-    /// file, master shift or bus shift is an option.
-    pub fn adapt(&self, declaration: &mut Declaration, asked: bool) -> Result<(), Failure> {
-        if !self.sync.is_empty() || self.reference != ReferenceClock::default() {
-            return Err(Failure::new("--sync and --reference: the file has the SYNC signals and the reference clock"));
+    /// Whether the options fit the declaration of a file: SYNC signals and the reference are those of the file.
+    pub fn check_with_file(&self, declaration: &Declaration, asked: bool) -> Result<(), Failure> {
+        if !self.sync.is_empty() {
+            return Err(Failure::new("--sync: with --eni or --network the SYNC signals are those of the file"));
         }
-        let Some(config) = &mut declaration.clocks else {
+        if self.reference.is_some() {
+            return Err(Failure::new("--reference: with --eni or --network the reference clock is that of the file"));
+        }
+        if declaration.clocks.is_none() {
             return if asked { Err(Failure::new("the file has no distributed clocks")) } else { Ok(()) };
-        };
-        config.epoch = system_time::epoch(now());
-        config.bus_shift = (config.bus_shift || self.bus_shift) && self.phase.is_none();
+        }
         let cycle = declaration.domains.iter().map(|domain| domain.period).min().unwrap_or_default();
         self.check(&[], &[], cycle.as_nanos() as u64).map_err(Failure::new)
+    }
+
+    /// As [`ClockOptions::declare`] for the declaration of a file, for which [`ClockOptions::check_with_file`] was
+    /// asked: master shift or bus shift and estimated delays are options.
+    pub fn adapt(&self, declaration: &mut Declaration) {
+        let Some(config) = &mut declaration.clocks else { return };
+        config.epoch = system_time::epoch(now());
+        config.bus_shift = (config.bus_shift || self.bus_shift) && self.phase.is_none();
+        config.estimated_delays |= self.estimate_delays;
     }
 
     /// What makes cycles begin, with bus shift or without.
@@ -200,7 +209,7 @@ mod tests {
         found[0].name = "coupler".to_owned();
         let error =
             |options: ClockOptions| options.check(&found, &[None, None], 1_000_000).expect_err("it must be refused");
-        let with = |reference| ClockOptions { reference, ..ClockOptions::default() };
+        let with = |reference| ClockOptions { reference: Some(reference), ..ClockOptions::default() };
         assert!(error(with(ReferenceClock::Declared(SubDeviceId(0)))).contains("\"coupler\" has no distributed clock"));
         assert!(error(with(ReferenceClock::Declared(SubDeviceId(2)))).contains("SubDevices 0 to 1"));
         assert!(error(with(ReferenceClock::FirstConfigured)).contains("add --sync"));
@@ -208,7 +217,7 @@ mod tests {
         assert!(error(far).contains("less than the cycle of 1000 us, got -1000 us"));
         let good = ClockOptions {
             phase: Some(-999_999),
-            reference: ReferenceClock::Declared(SubDeviceId(1)),
+            reference: Some(ReferenceClock::Declared(SubDeviceId(1))),
             ..ClockOptions::default()
         };
         assert!(good.are_given() && good.check(&found, &[None, None], 1_000_000).is_ok());

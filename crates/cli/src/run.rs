@@ -127,7 +127,7 @@ fn begin(arguments: &RunArguments) -> Result<(Access, Option<ConfiguredNetwork>)
         None => Some(arguments.access.interfaces.links.redundant.is_some()),
     };
     // A wrong file shows before anything is opened.
-    let network = arguments.declared.configured.load(ring)?;
+    let network = arguments.declared.load(ring)?;
     let access = arguments.access.begin(&options(arguments, network.as_ref()))?;
     if let Some(network) = &network {
         network.check_links(access.interfaces.links.redundant.is_some())?;

@@ -187,19 +187,33 @@ impl ConfiguredNetwork {
         self.configuration().at_station(station)
     }
 
+    /// The declaration of the file.
+    pub fn of_file(&self) -> &Declaration {
+        &self.configuration().declaration
+    }
+
     /// The declaration, where the SubDevices that were found are those of the file. Prints each difference.
     pub fn declaration(&self, found: &[SubDeviceInfo]) -> Result<Declaration, Failure> {
-        let differences = self.configuration().compare(found);
-        for difference in &differences {
-            warn(difference);
-        }
-        if differences.iter().any(|difference| difference.prevents_op) {
-            return Err(Failure::new("the network is not the one of the file: correct the file, or the network"));
+        if self.has_words_of(found) {
+            let differences = self.configuration().compare(found);
+            for difference in &differences {
+                warn(difference);
+            }
+            if differences.iter().any(|difference| difference.prevents_op) {
+                return Err(Failure::new("the network is not the one of the file: correct the file, or the network"));
+            }
         }
         Ok(match &self.file {
             FileOfNetwork::Eni { file, split_lrw } => file.declaration(*split_lrw),
             FileOfNetwork::Network(network) => network.declaration(),
         })
+    }
+
+    /// Whether the data words were read by which the file finds SubDevices. A MainDevice that joins a ring declares
+    /// before; its activation reads them, and compares.
+    fn has_words_of(&self, found: &[SubDeviceInfo]) -> bool {
+        let words = ringcat::data_words(&self.configuration().declaration.subdevices);
+        words.into_iter().all(|word| found.iter().any(|info| info.data_word(word).is_some()))
     }
 
     /// Number of SubDevices on the bus that the file lacks. [`EniNetwork::declaration`] prints each; they stay in INIT.
@@ -329,7 +343,7 @@ fn near<'a>(wanted: &str, names: impl Iterator<Item = &'a str>) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use ringcat::simulated::SimulatedSegment;
-    use ringcat::{Instant, MainDevice, Options};
+    use ringcat::{DataWord, Instant, MainDevice, Options, RegisterAddress};
 
     use super::*;
 
@@ -423,6 +437,22 @@ mod tests {
         let drive = network.names().0.iter().position(|name| name.starts_with("Drive")).unwrap();
         assert_eq!(objects[drive].entry(0x6064, 0), Some("Position"), "{:?}", objects[drive]);
         assert_eq!(network.objects(&[], Vec::new()).len(), declared, "nothing was found");
+    }
+
+    // covers: network-file
+    #[test]
+    fn a_network_with_a_data_word_is_declared_before_the_word_is_read() {
+        let text = "ringcat_network = 1\n[[domain]]\nname = \"d\"\nperiod = \"1ms\"\n[[subdevice]]\nname = \"A\"\n\
+                    identification = 7\nidentification_word = 0x1000\n";
+        let file = LoadedNetwork::from_bytes("a.toml", text.as_bytes()).unwrap();
+        let file = FileOfNetwork::Network(Box::new(file));
+        let network = ConfiguredNetwork { file, set: Vec::new(), watch: Vec::new() };
+        let mut found = SubDeviceInfo::default();
+        assert!(network.declaration(&[found.clone()]).is_ok(), "the activation compares");
+        for (value, fits) in [(7, true), (8, false)] {
+            found.data_words = vec![DataWord::new(RegisterAddress(0x1000), value)];
+            assert_eq!(network.declaration(&[found.clone()]).is_ok(), fits, "{value}");
+        }
     }
 
     // covers: CR-16

@@ -26,6 +26,20 @@ pub struct DeclarationArguments {
 }
 
 impl DeclarationArguments {
+    /// The network of the file, if there is one: options that do not fit it are refused before anything is sent.
+    /// `has_redundant`: whether there is a redundant interface, where it is known.
+    pub fn load(&self, has_redundant: Option<bool>) -> Result<Option<ConfiguredNetwork>, Failure> {
+        let network = self.configured.load(has_redundant)?;
+        if let Some(network) = &network {
+            self.clock_options.check_with_file(network.of_file(), self.asks_for_clocks())?;
+        }
+        Ok(network)
+    }
+
+    fn asks_for_clocks(&self) -> bool {
+        self.clocks || self.clock_options.are_given()
+    }
+
     /// The declaration: the network of the file, or the SubDevices found as their SIIs describe them.
     pub fn declare(
         &self,
@@ -33,16 +47,15 @@ impl DeclarationArguments {
         found: &[SubDeviceInfo],
     ) -> Result<Declaration, Failure> {
         let options = &self.clock_options;
-        let asked = self.clocks || options.are_given();
         let Some(network) = network else {
             let mut declaration = automatic(found, self.cycle);
-            if asked {
+            if self.asks_for_clocks() {
                 options.declare(&mut declaration, found)?;
             }
             return Ok(declaration);
         };
         let mut declaration = network.declaration(found)?;
-        options.adapt(&mut declaration, asked)?;
+        options.adapt(&mut declaration);
         Ok(declaration)
     }
 

@@ -68,7 +68,7 @@ pub fn run(arguments: &StandbyArguments) -> Result<Report, Failure> {
     let Some(redundant) = names.redundant.as_deref() else {
         return Err(Failure::new("one of two MainDevices has two interfaces: add --redundant"));
     };
-    let network = arguments.declared.configured.load(Some(true))?;
+    let network = arguments.declared.load(Some(true))?;
     if network.as_ref().is_some_and(|network| network.junctions().is_some()) {
         return Err(Failure::new("the file has rings behind junctions: not with two MainDevices"));
     }

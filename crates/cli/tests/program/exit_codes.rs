@@ -16,12 +16,13 @@ enum Output {
 use Output::{Full, Read};
 
 /// Files of the situations, by their names in the command lines.
-const FILES: [(&str, &str); 7] = [
+const FILES: [(&str, &str); 8] = [
     ("empty.toml", "[segment]\nring = true\n"),
     ("line.toml", "[[device]]\ntype = \"coupler\"\n"),
     ("unknown.toml", "[[device]]\ntype = \"digital-otput-8\"\n"),
     ("kind.toml", "[[device]]\ntype = \"coupler\"\ncount = \"two\"\n"),
     ("image.toml", "[[device]]\nsii = \"no-such.bin\"\n"),
+    ("network.toml", "ringcat_network = 1\n[[domain]]\nname = \"d\"\nperiod = \"1ms\"\n[[subdevice]]\nname = \"A\"\n"),
     ("broken.xml", "<EtherCATConfig><Config>"),
     (
         "empty.xml",
@@ -32,7 +33,7 @@ const FILES: [(&str, &str); 7] = [
 
 /// Command line, with `DIR` for the files; where its output goes; exit status; beginning of the last line behind
 /// `result: FAILED: `.
-const SITUATIONS: [(&str, Output, i32, &str); 46] = [
+const SITUATIONS: [(&str, Output, i32, &str); 54] = [
     // The command line.
     ("nonsense", Read, 2, "unrecognized subcommand 'nonsense'"),
     ("scan", Read, 2, "the following required arguments were not provided: --main <IF>"),
@@ -119,6 +120,55 @@ const SITUATIONS: [(&str, Output, i32, &str); 46] = [
         Read,
         2,
         "DIR/missing/x.svg cannot be written: No such file or directory",
+    ),
+    // Options about clocks that a file decides: before anything is sent.
+    (
+        "run --main no-such --eni EXAMPLES/machine.eni.xml --reference first",
+        Read,
+        2,
+        "--reference: with --eni or --network the reference clock is that of the file",
+    ),
+    (
+        "run --main no-such --eni EXAMPLES/machine.eni.xml --sync auto",
+        Read,
+        2,
+        "--sync: with --eni or --network the SYNC signals are those of the file",
+    ),
+    (
+        "run --main no-such --network DIR/network.toml --reference first",
+        Read,
+        2,
+        "--reference: with --eni or --network the reference clock is that of the file",
+    ),
+    (
+        "run --main no-such --network DIR/network.toml --sync auto",
+        Read,
+        2,
+        "--sync: with --eni or --network the SYNC signals are those of the file",
+    ),
+    (
+        "standby --main no-such --redundant no-other --eni EXAMPLES/machine.eni.xml --reference first",
+        Read,
+        2,
+        "--reference: with --eni or --network the reference clock is that of the file",
+    ),
+    (
+        "standby --main no-such --redundant no-other --eni EXAMPLES/machine.eni.xml --sync auto",
+        Read,
+        2,
+        "--sync: with --eni or --network the SYNC signals are those of the file",
+    ),
+    (
+        "standby --main no-such --redundant no-other --network DIR/network.toml --reference first",
+        Read,
+        2,
+        "--reference: with --eni or --network the reference clock is that of the file",
+    ),
+    (
+        "standby --main no-such --redundant no-other --network DIR/network.toml --sync auto",
+        Read,
+        2,
+        "--sync: with --eni or --network the SYNC signals are those of the file",
     ),
     // A standard output that takes nothing.
     ("demo --fast", Full, 1, "the standard output cannot be written: No space left on device"),
