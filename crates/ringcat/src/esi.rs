@@ -9,8 +9,10 @@ mod folder;
 mod objects;
 #[cfg(feature = "sim")]
 mod segment;
+mod walk;
 
 pub use file::{EsiFailure, load};
-pub use folder::{EsiFolder, MAX_FILES};
+pub use folder::EsiFolder;
 #[cfg(feature = "sim")]
 pub use segment::{EsiDevices, load_segment};
+pub use walk::MAX_FILES;

@@ -12,11 +12,7 @@ use ringcat_config::esi::Esi;
 use ringcat_config::esi::index::{Described, Index, IndexedFile, Stamp};
 
 use super::file::{EsiFailure, bytes_of, load, load_noting};
-
-/// Folders below the folder, one in the other.
-const MAX_DEPTH: usize = 6;
-/// Files of a folder at most; the others are left out.
-pub const MAX_FILES: usize = 10_000;
+use super::walk::walk;
 
 /// A folder of device descriptions.
 #[derive(Debug)]
@@ -25,20 +21,24 @@ pub struct EsiFolder {
     index: Index,
     read: usize,
     not_kept: Option<io::Error>,
+    notices: Vec<String>,
 }
 
 impl EsiFolder {
     /// Opens a folder with all folders in it, or a single file. `kept`: the file in which the index is kept; without
-    /// one all files are read. A file that is refused is in the index with its reason.
+    /// one all files are read. A file that is refused is in the index with its reason. Links are followed, and each
+    /// file and each folder counts once; [`EsiFolder::notices`] names paths that are left out.
     ///
     /// # Errors
     /// The folder or the file cannot be read.
     pub fn open(path: &Path, kept: Option<&Path>) -> Result<EsiFolder, EsiFailure> {
-        let mut found = Vec::new();
+        let (mut found, mut notices) = (Vec::new(), Vec::new());
         let failed = |error| EsiFailure::Read { path: path.to_owned(), error };
         let about = fs::metadata(path).map_err(failed)?;
         let path = if about.is_dir() {
-            collect(path, MAX_DEPTH, &mut found).map_err(failed)?;
+            let walked = walk(path).map_err(failed)?;
+            notices = walked.notices;
+            found.extend(walked.files.into_iter().map(|(file, metadata)| (file, stamp(&metadata))));
             path
         } else {
             found.push((path.to_owned(), stamp(&about)));
@@ -59,7 +59,7 @@ impl EsiFolder {
         let index = Index::new(files.collect());
         let has_changed = read > 0 || index.files().len() != before.files().len();
         let not_kept = kept.filter(|_| has_changed).and_then(|kept| keep(kept, &index).err());
-        Ok(EsiFolder { path: path.to_owned(), index, read, not_kept })
+        Ok(EsiFolder { path: path.to_owned(), index, read, not_kept, notices })
     }
 
     /// The file in which the index of a folder is kept by default, in the cache of the user; `None` without a home.
@@ -82,6 +82,12 @@ impl EsiFolder {
         self.read
     }
 
+    /// Paths in the folder that are left out, with the reason: links that lead nowhere, folders that may not be read or
+    /// are too deep, files beyond [`MAX_FILES`](super::MAX_FILES).
+    pub fn notices(&self) -> &[String] {
+        &self.notices
+    }
+
     /// Why the index could not be kept for the next time.
     pub fn not_kept(&self) -> Option<&io::Error> {
         self.not_kept.as_ref()
@@ -94,25 +100,6 @@ impl EsiFolder {
     pub fn load(&self, described: &Described<'_>) -> Result<Esi, EsiFailure> {
         load(&self.path.join(&described.file.path))
     }
-}
-
-/// All files of a folder with the ending `xml`, with size and time.
-fn collect(folder: &Path, depth: usize, found: &mut Vec<(PathBuf, Stamp)>) -> io::Result<()> {
-    for entry in fs::read_dir(folder)? {
-        let path = entry?.path();
-        // A link to nothing is no file.
-        let Ok(metadata) = fs::metadata(&path) else { continue };
-        if metadata.is_dir() && depth > 0 {
-            // A folder that this user may not read is left out.
-            let _ = collect(&path, depth - 1, found);
-        } else if metadata.is_file()
-            && path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml"))
-            && found.len() < MAX_FILES
-        {
-            found.push((path, stamp(&metadata)));
-        }
-    }
-    Ok(())
 }
 
 fn stamp(metadata: &Metadata) -> Stamp {
