@@ -111,24 +111,18 @@ impl<'a> Element<'a> {
         self.parsed(&self.raw(), None)
     }
 
-    /// The number in a child; `None` if the child is missing or empty.
+    /// The number in a child; `None` if the child is missing. An empty one is an error (protocol ES-170).
     pub fn number_of<T: TryFrom<i64>>(&self, name: &str) -> Result<Option<T>, EsiError> {
-        match self.child(name) {
-            Some(child) if !child.raw().trim().is_empty() => child.number().map(Some),
-            _ => Ok(None),
-        }
+        self.child(name).map(|child| child.number()).transpose()
     }
 
     pub fn required_number<T: TryFrom<i64>>(&self, name: &'static str) -> Result<T, EsiError> {
         self.required(name)?.number()
     }
 
-    /// The number in an attribute; `None` if it is missing or empty.
+    /// The number in an attribute; `None` if it is missing. An empty one is an error (protocol ES-170).
     pub fn number_in<T: TryFrom<i64>>(&self, attribute: &str) -> Result<Option<T>, EsiError> {
-        match self.attribute(attribute) {
-            Some(text) if !text.trim().is_empty() => self.parsed(text, Some(attribute)).map(Some),
-            _ => Ok(None),
-        }
+        self.attribute(attribute).map(|text| self.parsed(text, Some(attribute))).transpose()
     }
 
     fn parsed<T: TryFrom<i64>>(&self, text: &str, attribute: Option<&str>) -> Result<T, EsiError> {
@@ -148,9 +142,13 @@ impl<'a> Element<'a> {
         })
     }
 
-    /// The boolean in an attribute; `None` if it is missing.
+    /// The boolean in an attribute; `None` if it is missing, and with a notice if it is empty, as in real files.
     pub fn flag_in(&self, attribute: &str) -> Result<Option<bool>, EsiError> {
-        let Some(text) = self.attribute(attribute).filter(|text| !text.trim().is_empty()) else { return Ok(None) };
+        let Some(text) = self.attribute(attribute) else { return Ok(None) };
+        if text.trim().is_empty() {
+            self.file.note(self.line(), format!("{}@{attribute} is empty: read as if it were missing", self.name()));
+            return Ok(None);
+        }
         let wrong = || {
             let expected = format!("0, 1, true or false in the attribute {attribute}");
             self.error(EsiProblem::Value { expected, got: shown(text) })

@@ -48,6 +48,30 @@ fn nested_elements_and_entities_are_refused_before_they_cost_memory() {
     assert!(changed("<Groups", &format!("<Groups{attributes}")).contains("attributes of an element"));
 }
 
+/// A number that is there without a digit is none, in an attribute as in an element.
+// covers: esi-read, ES-170
+#[test]
+fn an_empty_number_is_refused_and_an_empty_flag_is_noted() {
+    for (from, to, attribute) in [
+        ("<Name LcId=\"1033\">", "<Name LcId=\"\">", "LcId"),
+        (" Sm=\"0\"", " Sm=\" \"", "Sm"),
+        ("ProductCode=\"#x", "ProductCode=\"\" Other=\"#x", "ProductCode"),
+    ] {
+        let error = changed(from, to);
+        let expected = format!("in the attribute {attribute}, decimal or #x and hexadecimal digits");
+        assert!(error.contains(&expected) && error.contains("got \""), "{error}");
+    }
+    assert!(changed("<SubIndex>3</SubIndex>", "<SubIndex></SubIndex>").contains("a number of 8 bits"));
+    let text = ACME.replacen(" Mandatory=\"1\"", " Mandatory=\"\"", 1);
+    assert_ne!(text, ACME);
+    let esi = esi::read("flag.xml", text.as_bytes()).expect("it is read");
+    let notices: Vec<String> = esi.notices.iter().map(ToString::to_string).collect();
+    assert!(
+        notices.iter().any(|it| it.contains("RxPdo@Mandatory is empty: read as if it were missing")),
+        "{notices:?}"
+    );
+}
+
 // covers: esi-read, ES-05
 #[test]
 fn wrong_encodings_and_other_files_are_named() {

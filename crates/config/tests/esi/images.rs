@@ -3,6 +3,7 @@
 
 use std::fs;
 
+use ringcat_config::esi::index::{Index, IndexedFile, Stamp};
 use ringcat_config::esi::sii::{self, Likeness, SiiOptions, SiiProfile};
 use ringcat_config::esi::{self, Device, Esi};
 use ringcat_wire::sii::Sii;
@@ -51,6 +52,21 @@ fn a_terminal_has_the_literal_image_of_twincat() {
     put(0xCC, "28000100 01FF 29000400 000F010044000903 2B000100 F0FF");
     put(0xE4, "33001400 0016010000051100 0070010601010000 0116020000071000 0000000000030000 1070010601010000 FFFF");
     assert_eq!(image, expected);
+}
+
+// covers: ES-13, ES-88
+#[test]
+fn blanks_of_a_name_are_in_the_image_and_not_in_comparisons() {
+    let text = OUTPUTS.replacen(">A2<", "> A2 <", 1);
+    assert_ne!(text, OUTPUTS);
+    let image = built(&text, |_| {});
+    let has = |part: &[u8]| image.windows(part.len()).any(|window| window == part);
+    assert!(has(b"\x04 A2 ") && !has(b"\x02A2"), "the length of the text counts its blanks");
+    let esi = read(&text);
+    assert_eq!(esi.devices[0].kind, " A2 ");
+    let index = Index::new(vec![IndexedFile::of("acme.xml", Stamp::default(), &esi)]);
+    let kinds: Vec<&str> = index.devices().map(|(_, device)| device.kind.as_str()).collect();
+    assert_eq!(kinds, ["A2"]);
 }
 
 // covers: ES-88, ES-180

@@ -31,7 +31,27 @@ pub fn model(path: &Path) -> Esi {
 /// Notices of second definitions and of names of nothing.
 const NOTED: [&str; 5] = ["is there already", "the one of line", "names no group", "is not described", "SubIdx"];
 
-// covers: esi-read, ES-02, ES-05, ES-10, ES-160
+/// What the limits of the reader are above of.
+// covers: ES-02, ES-04
+#[test]
+fn the_largest_real_file_is_far_below_the_limits() {
+    let all: Vec<(PathBuf, Vec<u8>)> =
+        files("esi").into_iter().map(|path| (path.clone(), fs::read(path).unwrap())).collect();
+    let Some((path, bytes)) = all.iter().max_by_key(|(_, bytes)| bytes.len()) else { return };
+    assert_eq!((bytes.len(), model(path).devices.len()), (4_171_103, 155));
+    let (mut entries, mut with_cdata) = (0, 0);
+    for (path, bytes) in &all {
+        let has = |part: &str| bytes.windows(part.len()).any(|window| window.eq_ignore_ascii_case(part.as_bytes()));
+        assert!(!has("<!DOCTYPE"), "{}", path.display());
+        with_cdata += usize::from(has("<![CDATA["));
+        let esi = model(path);
+        let pdos = esi.devices.iter().flat_map(|device| device.rx_pdos.iter().chain(&device.tx_pdos));
+        entries = entries.max(pdos.map(|pdo| pdo.entries.len()).max().unwrap_or(0));
+    }
+    assert!(with_cdata > 0 && entries == 32, "{with_cdata} {entries}");
+}
+
+// covers: esi-read, ES-05, ES-10, ES-160
 #[test]
 fn every_real_file_is_read() {
     let (mut devices, mut noted) = (0, [0; NOTED.len()]);

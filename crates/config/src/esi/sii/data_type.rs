@@ -70,9 +70,24 @@ pub fn name_of(code: u16) -> String {
 mod tests {
     use super::*;
 
+    /// The codes of the sheet, as it lists them.
+    const SHEET: &str = "BOOL 1, SINT 2, INT 3, DINT 4, USINT 5, UINT 6, UDINT 7, REAL 8, STRING 9, OCTET_STRING A, \
+        UNICODE_STRING B, TIME_OF_DAY C, TIME_DIFFERENCE D, INT24 10, LREAL 11, INT40 12, INT48 13, INT56 14, LINT 15, \
+        UINT24 16, UINT40 18, UINT48 19, UINT56 1A, ULINT 1B, GUID 1D, BYTE 1E, WORD 1F, DWORD 20, BITARR8 2D, \
+        BITARR16 2E, BITARR32 2F, ARRAY_OF_INT 260, ARRAY_OF_SINT 261, ARRAY_OF_DINT 262, ARRAY_OF_UDINT 263";
+
     // covers: ES-76
     #[test]
     fn data_types_have_the_codes_of_coe() {
+        let sheet = SHEET.split(", ").map(|pair| pair.split_once(' ').expect("a name and a code"));
+        for (name, code) in sheet {
+            let code = u16::from_str_radix(code, 16).expect("hexadecimal");
+            assert_eq!((code_of(name), name_of(code).as_str()), (Some(code), name));
+        }
+        for bits in 1..=16 {
+            let name = format!("BIT{bits}");
+            assert_eq!((code_of(&name), name_of(0x2F + bits)), (Some(0x2F + bits), name));
+        }
         for (name, code) in
             [("BOOL", 1), ("UDINT", 7), ("STRING(32)", 9), ("BIT2", 0x31), ("BIT16", 0x3F), ("byte", 0x1E)]
         {
