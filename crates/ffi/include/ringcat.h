@@ -30,18 +30,25 @@ typedef struct {
  *
  * Returns 0, or -EINVAL: the file cannot be read or is wrong, or it does not fit the bus (standard error has file, line
  * and reason); -EBUSY: SubDevices or domains were declared before, or the master is active; -EPERM: not reserved;
- * -EFAULT: path is NULL. If it fails nothing is declared. After ecrt_master_deactivate() nothing is declared either.
+ * -EFAULT: path is NULL; -ENODEV: the threads of the library have ended. If it
+ * fails nothing is declared. After ecrt_master_deactivate() nothing is declared either.
  *
  * Settings of its SubDevices cannot be changed by the program: the functions ecrt_slave_config_*() that do return
  * -EBUSY. SubDevices and domains of its own can be added.
  */
 EC_PUBLIC_API int ringcat_master_load_network(ec_master_t *master, const char *path);
 
-/* The same with the contents of a network file in memory, of `size` bytes; it is read once. -EFAULT: data is NULL. */
+/*
+ * The same with the contents of a network file in memory, of `size` bytes; it is read once. Returns as
+ * ringcat_master_load_network(); -EFAULT: data is NULL. Messages name the file "network file in memory".
+ */
 EC_PUBLIC_API int ringcat_master_load_network_data(ec_master_t *master, const void *data, size_t size);
 
 /*
  * Declares the network of an ENI. Returns as ringcat_master_load_network().
+ *
+ * Settings of the file that are not followed, or done in another way, are no error: standard error has a line for each
+ * of the first 20, with file, line and reason; `ringcat eni FILE` lists all.
  *
  * Its domains have their numbers as names, from "0", in the order of the tasks (`Cyclic`) that exchange process data;
  * variables have the names of the file, those that reach past the process data of a SyncManager none. Copies from
@@ -49,17 +56,23 @@ EC_PUBLIC_API int ringcat_master_load_network_data(ec_master_t *master, const vo
  */
 EC_PUBLIC_API int ringcat_master_load_eni(ec_master_t *master, const char *path);
 
-/* The same with the contents of an ENI in memory, of `size` bytes; it is read once. -EFAULT: data is NULL. */
+/*
+ * The same with the contents of an ENI in memory, of `size` bytes; it is read once. Returns as
+ * ringcat_master_load_network(); -EFAULT: data is NULL. Messages name the file "ENI in memory".
+ */
 EC_PUBLIC_API int ringcat_master_load_eni_data(ec_master_t *master, const void *data, size_t size);
 
-/* The SubDevice with a name in the file; NULL if there is none. ecrt_master_slave_config() finds it, too. */
+/*
+ * The SubDevice with a name in the file, the first one if several have it; NULL if there is none.
+ * ecrt_master_slave_config() finds it, too.
+ */
 EC_PUBLIC_API ec_slave_config_t *ringcat_master_subdevice(ec_master_t *master, const char *name);
 
 /* The domain with a name in the file; NULL if there is none. */
 EC_PUBLIC_API ec_domain_t *ringcat_master_domain(ec_master_t *master, const char *name);
 
 /*
- * Finds the variable with a name in the file, as in "Drive.Feedback.Statusword".
+ * Finds the variable with a name in the file, as in "Drive.Feedback.Statusword"; the first one if several have it.
  *
  * Returns 0, or -ENOENT: there is none, or no domain exchanges it; -EPERM: not reserved; -EFAULT: NULL.
  */

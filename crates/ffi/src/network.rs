@@ -6,14 +6,20 @@ use std::fmt::Display;
 use std::path::Path;
 
 use ringcat::config::{Configuration, ImageArea, Variable};
+use ringcat::daemon::Priority;
 use ringcat::eni::EniFile;
 use ringcat::network::LoadedNetwork;
 use ringcat::{ConfigAddress, Declaration, Direction, DomainId, SubDeviceConfig, SubDeviceInfo};
 
-use crate::code::{Code, Outcome, report};
+use crate::code::{Code, Outcome, report, report_as};
 use crate::settings::Name;
 
-/// Names of a loaded network.
+/// The name of an ENI without a file, for messages.
+const ENI_IN_MEMORY: &str = "ENI in memory";
+/// Notices of a file that are reported one by one.
+const MAX_NOTICES: usize = 20;
+
+/// Names of a loaded network. Of several with one name it is the first in the file.
 #[derive(Debug, Default)]
 pub struct Names {
     /// SubDevices, by their index in the declaration.
@@ -97,9 +103,14 @@ impl Network {
         let EniFile { configuration, .. } = match source {
             Source::Path(path) => EniFile::load(Path::new(path)).map_err(refused)?,
             Source::Memory(bytes) => {
-                EniFile::from_bytes(bytes).map_err(|error| refused(format_args!("ENI in memory: {error}")))?
+                EniFile::from_bytes(bytes).map_err(|error| refused(format_args!("{ENI_IN_MEMORY}: {error}")))?
             }
         };
+        let name = match source {
+            Source::Path(path) => path,
+            Source::Memory(_) => ENI_IN_MEMORY,
+        };
+        report_notices(name, &configuration);
         let domains = (0..configuration.declaration.domains.len()).map(|number| number.to_string()).collect();
         Ok(Network { configuration, domains, is_ring: false })
     }
@@ -109,6 +120,17 @@ impl Network {
     /// The declared SubDevices.
     pub fn declared(&self) -> &[SubDeviceConfig] {
         &self.configuration.declaration.subdevices
+    }
+}
+
+/// Reports the settings of a file that are not followed, a line each.
+fn report_notices(file: &str, configuration: &Configuration) {
+    let notices = &configuration.notices;
+    for notice in notices.iter().take(MAX_NOTICES) {
+        report_as(Priority::Warning, format_args!("{file}: not followed, or done in another way: {notice}"));
+    }
+    if let Some(more @ 1..) = notices.len().checked_sub(MAX_NOTICES) {
+        report_as(Priority::Warning, format_args!("{file}: {more} more; `ringcat eni FILE` lists all"));
     }
 }
 
@@ -168,10 +190,12 @@ pub fn names(configuration: &Configuration, domains: &[String], areas: &[Area]) 
     let subdevices = configuration.subdevices.iter().enumerate();
     let domains = domains.iter().enumerate();
     let variables = configuration.image.variables.iter();
+    // The first of several with one name is the last that is put in.
     Names {
-        subdevices: subdevices.map(|(index, facts)| (facts.name.clone(), index)).collect(),
+        subdevices: subdevices.rev().map(|(index, facts)| (facts.name.clone(), index)).collect(),
         domains: domains.map(|(number, name)| (name.clone(), DomainId(number))).collect(),
         variables: variables
+            .rev()
             .filter_map(|variable| Some((variable.name.clone(), place(&configuration.image.areas, areas, variable)?)))
             .collect(),
     }
