@@ -309,3 +309,22 @@ fn commands_to_the_whole_bus_have_a_limit_and_many_on_ways_to_init_take_no_time(
     let many = changed(&[(DRIVE, &format!("{}{DRIVE}", own.repeat(60_000)))]);
     assert_eq!(drive(&many).startup.iter().filter(|it| it.transition == Transition::Oi).count(), 60_001);
 }
+
+/// The seed of the fuzz target: it is followed, with each kind of command and of group.
+// covers: 8.2, eni-image
+#[test]
+fn the_file_with_every_kind_of_command_is_followed() {
+    let configuration = configured(include_str!("../files/commands.xml"));
+    let declared = &configuration.declaration.subdevices;
+    let actions: Vec<&StartupAction> = declared.iter().flat_map(|it| &it.startup).map(|it| &it.action).collect();
+    let has = |is: fn(&StartupAction) -> bool| actions.iter().any(|action| is(action));
+    assert!(has(|it| matches!(it, StartupAction::Sdo(_))) && has(|it| matches!(it, StartupAction::Upload(_))));
+    assert!(has(|it| matches!(it, StartupAction::Idn(_))) && has(|it| matches!(it, StartupAction::IdnRead(_))));
+    assert!(has(|it| matches!(it, StartupAction::FileWrite(_))) && has(|it| matches!(it, StartupAction::FileRead(_))));
+    assert!(has(|it| matches!(it, StartupAction::Mail(MailMessage::Aoe(_)))));
+    assert!(has(|it| matches!(it, StartupAction::Mail(MailMessage::Voe(_)))));
+    let at = |transition: &Transition| declared[0].startup.iter().any(|it| it.transition == *transition);
+    assert!(Transition::ALL.iter().all(at));
+    assert_eq!(declared.iter().filter(|it| it.address.data_word().is_some()).count(), 2);
+    assert_eq!(configuration.groups.len(), 3);
+}

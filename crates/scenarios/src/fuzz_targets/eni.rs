@@ -15,6 +15,8 @@ use crate::dice::Dice;
 pub const WHOLE: &str = include_str!("../../../config/tests/files/small.xml");
 /// A hot connect group, commands without many of their parts, values at edges.
 pub const GROUP: &str = include_str!("../../../config/tests/files/group.xml");
+/// Groups by data words and a switch, commands of each protocol, at each transition and for the whole bus.
+pub const COMMANDS: &str = include_str!("../../../config/tests/files/commands.xml");
 
 /// Reads and follows a file; the result must be consistent, and building a segment from it must not panic.
 pub fn target(bytes: &[u8]) {

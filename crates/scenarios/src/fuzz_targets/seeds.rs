@@ -43,7 +43,7 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
         "aoe" => aoe(),
         "voe" => vec![written(|out| VoeMessage { vendor_id: 7, vendor_type: 3, data: b"vendor" }.encode(out))],
         "gateway" => payloads().into_iter().map(|(protocol, payload)| in_gateway(protocol, &payload)).collect(),
-        "eni" => vec![super::eni::GROUP.as_bytes().to_vec()],
+        "eni" => [super::eni::GROUP, super::eni::COMMANDS].map(|text| text.as_bytes().to_vec()).to_vec(),
         "esi" => vec![super::esi::SMALL.as_bytes().to_vec()],
         "control" => super::control::seeds(),
         "master_frame" => super::master_frame::seeds(),

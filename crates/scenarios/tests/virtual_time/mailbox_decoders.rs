@@ -84,7 +84,7 @@ const ENI_MUTANTS: usize = 150;
 fn mutants_of_an_eni_are_consistent_configurations_or_errors() {
     for seed in from_environment().unwrap_or(8..9) {
         let mut dice = Dice::new(seed);
-        for text in [eni::WHOLE, eni::GROUP] {
+        for text in [eni::WHOLE, eni::GROUP, eni::COMMANDS] {
             let mut followed = 0;
             for number in 0..=ENI_MUTANTS {
                 let mutant = if number == 0 { text.to_owned() } else { eni::mutate(text, &mut dice) };

@@ -229,7 +229,7 @@ fn commands_of_the_way_down_and_up_are_sent_in_order() {
 }
 
 /// Outputs of a terminal without a state machine: only the SyncManager disables them in SAFEOP.
-// covers: 4.4, sync-managers-declared
+// covers: 4.4, sync-managers-declared, ES-43
 #[test]
 fn a_sync_manager_for_op_only_is_off_in_safeop_on_the_way_up_and_down() {
     let mut devices = descriptions(&["coupler", "emulated-output-8", "digital-input-8"]);
