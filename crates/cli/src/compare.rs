@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{ArgGroup, Args};
 use ringcat::SubDeviceInfo;
 use ringcat::config::{Configuration, FoundNetwork, ObjectNames, Stated};
 use ringcat::eni::EniFile;
@@ -32,15 +32,15 @@ not be read.";
 
 /// Options of `ringcat compare`.
 #[derive(Args, Debug)]
-#[command(after_long_help = ABOUT_COMPARE)]
+#[command(after_long_help = ABOUT_COMPARE, group(ArgGroup::new("file").required(true).args(["eni", "network"])))]
 pub struct CompareArguments {
     #[command(flatten)]
     bus: BusArguments,
     /// The network of an ENI
-    #[arg(long, value_name = "FILE", required_unless_present = "network", help_heading = "Segment")]
+    #[arg(long, value_name = "FILE", help_heading = "Segment")]
     eni: Option<PathBuf>,
     /// The network of a network file (see docs/network-file.md)
-    #[arg(long, value_name = "FILE.toml", conflicts_with = "eni", help_heading = "Segment")]
+    #[arg(long, value_name = "FILE.toml", help_heading = "Segment")]
     network: Option<PathBuf>,
     #[command(flatten)]
     esi: EsiArgument,

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
 use ringcat::config::esi::Esi;
+use ringcat::config::esi::index::IndexedFile;
 use ringcat::config::esi::sii::{Comparison, Likeness, SiiOptions, SiiProfile, Skeleton, build, most_alike, skeleton};
-use ringcat::esi::{EsiFailure, load};
+use ringcat::esi::EsiFolder;
 use ringcat::regular_file::read_at_most;
 use ringcat::wire::sii::{Sii, SiiHeader};
 
@@ -141,25 +142,31 @@ fn built(arguments: &BuildArguments) -> Result<Report, Failure> {
     Ok(Report { verdict: Verdict::Held(held), data: Data::SiiBuilt(data) })
 }
 
-/// The descriptions of a file or a folder; a file that is refused is named and left out.
-fn descriptions(path: &Path) -> Result<Vec<Esi>, Failure> {
+/// Vendor and product code.
+type Product = (u32, u32);
+
+/// The description of a file, or those of a folder that describe one of these products. A file of the folder that is
+/// refused is named and left out.
+fn descriptions(path: &Path, wanted: &[Product]) -> Result<Vec<Esi>, Failure> {
     if !path.is_dir() {
         return Ok(vec![read(path)?]);
     }
-    let entries = fs::read_dir(path);
-    let entries = entries.map_err(|error| Failure::new(format!("{} cannot be read: {error}", path.display())))?;
-    let mut files: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
-    files.retain(|path| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml")));
-    files.sort();
-    let is_companion = |error: &EsiFailure| matches!(error, EsiFailure::Esi(error) if error.is_companion());
-    let left_out = |error: EsiFailure| {
-        if is_companion(&error) {
-        } else {
-            warn(format!("left out: {error}"))
-        }
+    let folder = EsiFolder::open(path, EsiFolder::default_index(path).as_deref());
+    let folder = folder.map_err(|error| Failure::new(error.to_string()))?;
+    folder.notices().iter().for_each(warn);
+    let files = folder.index().files();
+    let refused = files.iter().filter_map(|file| file.refused.as_deref());
+    refused.for_each(|reason| warn(format!("left out: {reason}")));
+    let describes = |file: &&IndexedFile| {
+        file.devices.iter().any(|device| wanted.contains(&(device.vendor_id, device.product_code)))
     };
-    let read = |path: &PathBuf| load(path).map_err(left_out).ok();
-    Ok(files.iter().filter_map(read).collect())
+    files.iter().filter(describes).map(|file| read(&path.join(&file.path))).collect()
+}
+
+/// The product of an image, if it is one.
+fn product_of(image: &[u8]) -> Option<Product> {
+    let identity = Sii::parse(image).ok()?.header().identity;
+    Some((identity.vendor_id, identity.product_code))
 }
 
 /// The bytes of an image. The limit applies to the bytes that are read.
@@ -174,11 +181,12 @@ fn image_of(path: &Path) -> Result<Vec<u8>, Failure> {
 }
 
 fn compared(arguments: &CompareArguments) -> Result<Report, Failure> {
-    let all = descriptions(&arguments.esi)?;
+    let read: Vec<Vec<u8>> = arguments.images.iter().map(|path| image_of(path)).collect::<Result<_, _>>()?;
+    let products: Vec<Product> = read.iter().filter_map(|bytes| product_of(bytes)).collect();
+    let all = descriptions(&arguments.esi, &products)?;
     let mut images = Vec::new();
-    for path in &arguments.images {
-        let bytes = image_of(path)?;
-        let image = against(&all, path, &bytes);
+    for (path, bytes) in arguments.images.iter().zip(&read) {
+        let image = against(&all, path, bytes);
         lines(&image).iter().for_each(|line| say!("{line}"));
         images.push(image);
     }

@@ -5,7 +5,7 @@ use std::fs::{self, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::{ArgGroup, Args, ValueEnum};
 use ringcat::config::{self, Export, ExportDetails, ExportError, ExportOptions, LrwUse, SubDeviceFacts, export};
 use ringcat::eni::EniFile;
 use ringcat::network::LoadedNetwork;
@@ -39,13 +39,13 @@ of them, and one that has some does not reach SAFEOP with it.
 
 /// Options of `ringcat eni export`.
 #[derive(Args, Debug)]
-#[command(after_long_help = ABOUT_EXPORT)]
+#[command(after_long_help = ABOUT_EXPORT, group(ArgGroup::new("file").required(true).args(["eni", "network"])))]
 pub struct ExportArguments {
     /// The network of a network file (see docs/network-file.md)
-    #[arg(long, value_name = "FILE.toml", required_unless_present = "eni", help_heading = "Network")]
+    #[arg(long, value_name = "FILE.toml", help_heading = "Network")]
     network: Option<PathBuf>,
     /// The network of another ENI, as RingCAT follows it
-    #[arg(long, value_name = "FILE", conflicts_with = "network", help_heading = "Network")]
+    #[arg(long, value_name = "FILE", help_heading = "Network")]
     eni: Option<PathBuf>,
     /// Use of LRW in the cyclic commands
     #[arg(long, value_enum, default_value = "as-declared", help_heading = "Network")]

@@ -16,13 +16,17 @@ enum Output {
 use Output::{Full, Read};
 
 /// Files of the situations, by their names in the command lines.
-const FILES: [(&str, &str); 8] = [
+const FILES: [(&str, &str); 9] = [
     ("empty.toml", "[segment]\nring = true\n"),
     ("line.toml", "[[device]]\ntype = \"coupler\"\n"),
     ("unknown.toml", "[[device]]\ntype = \"digital-otput-8\"\n"),
     ("kind.toml", "[[device]]\ntype = \"coupler\"\ncount = \"two\"\n"),
     ("image.toml", "[[device]]\nsii = \"no-such.bin\"\n"),
     ("network.toml", "ringcat_network = 1\n[[domain]]\nname = \"d\"\nperiod = \"1ms\"\n[[subdevice]]\nname = \"A\"\n"),
+    (
+        "preop.toml",
+        "ringcat_network = 1\n[[domain]]\nname = \"d\"\nperiod = \"1ms\"\n[[subdevice]]\nname = \"A\"\ntarget = \"PREOP\"\n",
+    ),
     ("broken.xml", "<EtherCATConfig><Config>"),
     (
         "empty.xml",
@@ -33,10 +37,16 @@ const FILES: [(&str, &str); 8] = [
 
 /// Command line, with `DIR` for the files; where its output goes; exit status; beginning of the last line behind
 /// `result: FAILED: `.
-const SITUATIONS: [(&str, Output, i32, &str); 54] = [
+const SITUATIONS: [(&str, Output, i32, &str); 56] = [
     // The command line.
     ("nonsense", Read, 2, "unrecognized subcommand 'nonsense'"),
     ("scan", Read, 2, "the following required arguments were not provided: --main <IF>"),
+    (
+        "compare --main lo",
+        Read,
+        2,
+        "the following required arguments were not provided: <--eni <FILE>|--network <FILE.toml>>",
+    ),
     ("run --main lo --cycle 1us", Read, 2, "invalid value '1us' for '--cycle <TIME>': expected 10us to 1s"),
     ("run --main lo --cycle 100s", Read, 2, "invalid value '100s' for '--cycle <TIME>': expected 10us to 1s"),
     ("run --main lo --cycle 0ms", Read, 2, "invalid value '0ms' for '--cycle <TIME>': expected more than zero"),
@@ -120,6 +130,12 @@ const SITUATIONS: [(&str, Output, i32, &str); 54] = [
         Read,
         2,
         "DIR/missing/x.svg cannot be written: No such file or directory",
+    ),
+    (
+        "eni export --network DIR/preop.toml",
+        Read,
+        2,
+        "DIR/preop.toml:7: SubDevice \"A\": subdevice[0].target: PREOP: an ENI describes a network in OP",
     ),
     // Options about clocks that a file decides: before anything is sent.
     (

@@ -333,6 +333,9 @@ fn images_are_built_compared_and_described_again() {
         (same.code, same.verdict()),
         (Some(0), "result: ok: 1 image as described, 0 with differences, 0 not compared")
     );
+    // In a folder below the folder, beside files that are no descriptions.
+    let below = ringcat(&["sii", "compare", &image, "--esi", &format!("{ACME}/..")]);
+    assert_eq!((below.code, below.verdict()), (same.code, same.verdict()), "{}", below.all());
     let mut bytes = fs::read(&image).expect("it was written");
     bytes[0x90] ^= 0x20;
     fs::write(&image, &bytes).expect("it is writable");
@@ -431,7 +434,7 @@ fn a_network_that_an_eni_cannot_express_is_refused_with_the_reason_and_no_file()
                    [[subdevice]]\nname = \"Drive\"\ntarget = \"PREOP\"\n";
     let (network, out) = (place.write("machine.toml", network), place.path("machine.xml"));
     let refused = ringcat(&["eni", "export", "--network", &network, "--out", &out]);
-    let expected = "SubDevice 0 \"Drive\": target: PREOP: an ENI describes a network in OP";
+    let expected = "machine.toml:7: SubDevice \"Drive\": subdevice[0].target: PREOP: an ENI describes a network in OP";
     assert!(refused.code == Some(2) && refused.verdict().contains(expected), "{}", refused.all());
     assert!(!std::path::Path::new(&out).exists());
     let json = ringcat(&["--json", "eni", "export", "--network", &network]);

@@ -5,11 +5,13 @@ use std::time::Duration;
 
 use ringcat::config::network::model::{Required, SubDevice};
 use ringcat::config::{Difference, DifferenceKind, FoundNetwork};
-use ringcat::network::{LoadedNetwork, NetworkFile, ScanOptions};
+use ringcat::network::{LoadedNetwork, NetworkFailure, NetworkFile, ScanOptions};
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{MainDevice, Options, Scan};
 use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::network::NetworkOptions;
+use scenarios::dice::Dice;
+use scenarios::seeds::from_environment;
 use scenarios::segments::{descriptions, line};
 
 use DifferenceKind::{Additional, Ambiguous, Missing};
@@ -82,14 +84,18 @@ fn scanned(types: &[&str], kind: Kind) -> (MainDevice<SimulatedSegment>, Scan) {
 
 /// The file of a bus, after a change.
 fn file_of(types: &[&str], kind: Kind, change: impl FnOnce(&mut NetworkFile)) -> LoadedNetwork {
+    read(types, kind, change).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The same, which may be refused.
+fn read(types: &[&str], kind: Kind, change: impl FnOnce(&mut NetworkFile)) -> Result<LoadedNetwork, NetworkFailure> {
     let (_, scan) = scanned(types, kind);
     let mut file = NetworkFile::from_scan(&scan.subdevices, &scan.topology, &ScanOptions::new("machine", PERIOD));
     for subdevice in &mut file.subdevice {
         (subdevice.position, subdevice.plugged_into) = (None, None);
     }
     change(&mut file);
-    let text = file.to_text();
-    LoadedNetwork::from_bytes("machine.toml", text.as_bytes()).unwrap_or_else(|error| panic!("{error}\n{text}"))
+    LoadedNetwork::from_bytes("machine.toml", file.to_text().as_bytes())
 }
 
 /// The differences of a bus, whose marks are checked on the bus.
@@ -168,4 +174,64 @@ fn twins_of_a_group_leave_it_absent_and_are_named_once() {
         let found = checked(&network, &bus[..2], kind);
         assert_eq!(short(&found), [(Missing, false, None); 2], "{kind:?}: {found:#?}");
     }
+}
+
+/// A bus of up to six devices, some of which have a mark of 1 or 2.
+fn random_bus(dice: &mut Dice) -> Vec<String> {
+    const TYPES: [&str; 3] = ["digital-output-8", "digital-input-8", "servo"];
+    let device = |dice: &mut Dice| {
+        let kind = *dice.pick(&TYPES);
+        match dice.below(2) {
+            0 => kind.to_owned(),
+            _ => format!("{kind}={}", 1 + dice.below(2)),
+        }
+    };
+    std::iter::once("coupler".to_owned()).chain((0..=dice.below(5)).map(|_| device(dice))).collect()
+}
+
+/// Declares marked SubDevices by their marks, some as heads of groups, some as optional.
+fn random_file(file: &mut NetworkFile, bus: &[String], kind: Kind, dice: &mut Dice) {
+    let mut group: Option<String> = None;
+    for (at, (subdevice, device)) in file.subdevice.iter_mut().zip(bus).enumerate() {
+        let mark = device.split_once('=').and_then(|(_, value)| value.parse().ok());
+        group = group.filter(|_| mark.is_none() && dice.below(2) == 0);
+        match mark {
+            Some(mark) if dice.below(3) > 0 => {
+                kind.declare(subdevice, mark);
+                group = (dice.below(2) == 0).then(|| format!("group {at}"));
+            }
+            _ => {}
+        }
+        subdevice.group.clone_from(&group);
+        subdevice.optional = dice.below(4) == 0;
+    }
+    file.required = if dice.below(4) == 0 { Required::All } else { Required::Mandatory };
+}
+
+// covers: network-file, hot-connect
+#[test]
+fn random_twins_are_marked_as_the_activation_decides() {
+    let (seeds, mut with_twins) = (from_environment().unwrap_or(0..60), 0);
+    for seed in seeds.clone() {
+        let mut dice = Dice::new(seed);
+        let kind = *dice.pick(&KINDS);
+        let declared = random_bus(&mut dice);
+        let mut bus = declared.clone();
+        for _ in 0..dice.below(3) {
+            let (one, other) = (dice.below(bus.len() as u64) as usize, dice.below(bus.len() as u64) as usize);
+            match dice.below(3) {
+                0 if one > 0 => bus.insert(one, bus[other].clone()),
+                1 if one > 0 && bus.len() > 2 => drop(bus.remove(one)),
+                _ => bus.swap(one, other),
+            }
+        }
+        let types: Vec<&str> = declared.iter().map(String::as_str).collect();
+        let change = |file: &mut NetworkFile| random_file(file, &declared, kind, &mut dice);
+        // Files with a mark twice are refused.
+        let Ok(network) = read(&types, kind, change) else { continue };
+        println!("seed {seed}: file {declared:?}, bus {bus:?}, {kind:?}\n{}", network.file.to_text());
+        let differences = checked(&network, &bus.iter().map(String::as_str).collect::<Vec<&str>>(), kind);
+        with_twins += usize::from(differences.iter().any(|it| it.kind == Ambiguous));
+    }
+    assert!(with_twins > 0 || seeds.count() < 60, "no bus had twins of a declared SubDevice");
 }
