@@ -30,8 +30,8 @@ typedef struct {
  *
  * Returns 0, or -EINVAL: the file cannot be read or is wrong, or it does not fit the bus (standard error has file, line
  * and reason); -EBUSY: SubDevices or domains were declared before, or the master is active; -EPERM: not reserved;
- * -EFAULT: path is NULL; -ENODEV: the threads of the library have ended. If it
- * fails nothing is declared. After ecrt_master_deactivate() nothing is declared either.
+ * -EFAULT: path is NULL; -ENODEV: the threads of the library have ended. If it fails nothing is declared. After
+ * ecrt_master_deactivate() nothing is declared either.
  *
  * Settings of its SubDevices cannot be changed by the program: the functions ecrt_slave_config_*() that do return
  * -EBUSY. SubDevices and domains of its own can be added.
