@@ -44,7 +44,7 @@ impl EsiArgument {
         let Some(path) = &self.esi else { return Ok(None) };
         let kept = EsiFolder::default_index(path);
         let folder = EsiFolder::open(path, kept.as_deref()).map_err(|error| Failure::new(error.to_string()))?;
-        folder.notices().iter().for_each(|notice| warn(notice));
+        folder.notices().iter().for_each(warn);
         let refused = folder.index().files().iter().find_map(|file| file.refused.as_deref());
         if let Some(reason) = refused.filter(|_| !path.is_dir()) {
             return Err(Failure::new(reason.to_owned()));

@@ -106,7 +106,7 @@ fn list(arguments: &ListArguments) -> Result<Report, Failure> {
     if let (Some(error), Some(kept)) = (folder.not_kept(), &kept) {
         warn(format!("the index cannot be kept in {}: {error}", kept.display()));
     }
-    folder.notices().iter().for_each(|notice| warn(notice));
+    folder.notices().iter().for_each(warn);
     let devices = chosen(&folder, arguments);
     table(&devices).iter().for_each(|line| say!("{line}"));
     let index = folder.index();

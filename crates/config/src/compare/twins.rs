@@ -23,13 +23,13 @@ pub(super) fn differences(
     for (config, error) in marks.errors() {
         let ConfigError::Ambiguous { first, .. } = error else { continue };
         let text = error.to_string();
-        // Members of an ambiguous group are counted by positions, and shift those behind them.
-        let head = found.iter().position(|info| info.position == *first);
-        let shifts = configs[config].group.is_some() && head.is_some_and(|head| marks.shifts(head));
-        let prevents_op = marks.fails(config) || shifts;
         match known.get(&text) {
-            Some(number) => differences[*number].prevents_op |= prevents_op,
+            Some(number) => differences[*number].prevents_op |= marks.fails(config),
             None => {
+                // Members of an ambiguous group are counted by positions, and shift those behind them.
+                let head = found.iter().position(|info| info.position == *first);
+                let shifts = configs[config].group.is_some() && head.is_some_and(|head| marks.shifts(head));
+                let prevents_op = marks.fails(config) || shifts;
                 let (subdevice, position) = (Some(SubDeviceId(config)), Some(*first));
                 let (kind, words) = (DifferenceKind::Ambiguous, format!("\"{}\": {text}", names[config]));
                 known.insert(text, differences.len());

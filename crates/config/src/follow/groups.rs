@@ -65,10 +65,10 @@ fn head(eni: &Eni, index: usize, group: &HotConnect) -> Result<ConfigAddress, En
 fn address(mark: Mark) -> Option<ConfigAddress> {
     let offset = 0;
     match mark {
-        Mark::Alias(alias) if alias != 0 => Some(ConfigAddress::Alias { alias, offset }),
+        Mark::Alias(alias) => Some(ConfigAddress::Alias { alias, offset }),
         Mark::DataWord { register, value } => Some(ConfigAddress::DataWord { register, value, offset }),
         Mark::Identification(value) => Some(ConfigAddress::Identification { value, offset }),
-        Mark::Alias(_) | Mark::Eeprom { .. } | Mark::EepromWord { .. } => None,
+        Mark::Eeprom { .. } | Mark::EepromWord { .. } => None,
     }
 }
 

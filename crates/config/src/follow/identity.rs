@@ -165,8 +165,8 @@ pub(super) fn is_eeprom_address(command: &EcatCommand) -> bool {
     (ado == map::SII_CONTROL || ado == map::SII_ADDRESS) && command.datagram.command.writes()
 }
 
-/// The aliases, identifications and data words that the commands of a group compare, each once; an alias may be read
-/// from the EEPROM or from its register.
+/// The first two different aliases, identifications or data words that the commands of a group compare; an alias may be
+/// read from the EEPROM or from its register.
 pub(super) fn group_marks(commands: &[EcatCommand]) -> Vec<(Mark, Place)> {
     let mut found: Vec<(Mark, Place)> = Vec::new();
     for (mark, whole, place) in marks(commands) {
@@ -177,8 +177,11 @@ pub(super) fn group_marks(commands: &[EcatCommand]) -> Vec<(Mark, Place)> {
             Mark::Alias(_) | Mark::Identification(_) | Mark::DataWord { .. } if whole => mark,
             Mark::Alias(_) | Mark::Identification(_) | Mark::DataWord { .. } => continue,
         };
-        if found.iter().all(|(known, _)| *known != mark) {
+        if mark != Mark::Alias(0) && found.iter().all(|(known, _)| *known != mark) {
             found.push((mark, place));
+        }
+        if found.len() == 2 {
+            break;
         }
     }
     found

@@ -138,6 +138,9 @@ fn a_group_with_several_marks_is_refused_with_the_line_of_the_second() {
             format!("expected one alias, identification or data word that is compared, got alias 4660 and {mark}");
         assert!(error.contains(&expected) && error.contains("line "), "{error}");
     }
+    // Many of them cost no more than two.
+    let many: String = (0..50_000).map(|number| word(0x1000 + number)).collect();
+    assert!(refusal(&twice(&many)).contains("got alias 4660 and data word 4660 at 0x1000"));
     let words = GROUP.replace("<Ado>18</Ado>", "<Ado>3864</Ado>");
     let words = words.replace("</HotConnect>", &format!("{}</HotConnect>", word(4096)));
     let error = refused(&[(HEAD, &words)]);
