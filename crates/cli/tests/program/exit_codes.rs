@@ -25,7 +25,8 @@ const FILES: [(&str, &str); 9] = [
     ("network.toml", "ringcat_network = 1\n[[domain]]\nname = \"d\"\nperiod = \"1ms\"\n[[subdevice]]\nname = \"A\"\n"),
     (
         "preop.toml",
-        "ringcat_network = 1\n[[domain]]\nname = \"d\"\nperiod = \"1ms\"\n[[subdevice]]\nname = \"A\"\ntarget = \"PREOP\"\n",
+        "ringcat_network = 1\n[[domain]]\nname = \"d\"\nperiod = \"1ms\"\n\
+         [[subdevice]]\nname = \"A\"\ntarget = \"PREOP\"\n",
     ),
     ("broken.xml", "<EtherCATConfig><Config>"),
     (

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use ringcat_engine::config::MailMessage;
 
-use super::error::{Fault, Step};
+use super::error::{Checked, Fault, Step, fault};
 use super::model::{At, Junctions, NetworkFile, Startup, SubDevice, SyncManager};
 use super::places;
 
@@ -26,12 +26,6 @@ const LONGEST_SHIFT_NS: i64 = i32::MAX as i64;
 const DATA_WORDS: std::ops::RangeInclusive<u16> = 0x0F00..=0xFFFE;
 /// Bytes of an IP host name.
 const HOST_NAME: usize = 32;
-
-pub(super) type Checked = Result<(), Fault>;
-
-pub(super) fn fault<const N: usize>(path: [Step; N], message: impl Into<String>) -> Checked {
-    Err(Fault { path: path.into(), message: message.into() })
-}
 
 /// Checks a file.
 pub(super) fn check(file: &NetworkFile) -> Checked {

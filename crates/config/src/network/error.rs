@@ -63,6 +63,14 @@ pub(super) struct Fault {
     pub(super) message: String,
 }
 
+/// Whether a part of a file is valid.
+pub(super) type Checked = Result<(), Fault>;
+
+/// A fault at a path.
+pub(super) fn fault<const N: usize>(path: [Step; N], message: impl Into<String>) -> Checked {
+    Err(Fault { path: path.into(), message: message.into() })
+}
+
 /// A step to a key.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Step {

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::check::{Checked, fault};
+use super::error::{Checked, fault};
 use super::model::NetworkFile;
 use super::write::next_position;
 use crate::declared_twice::declared_twice;

@@ -252,7 +252,8 @@ fn a_mark_that_two_subdevices_have_is_refused_with_its_line() {
         let text = marked(&[mark, "vendor = 2", mark]);
         let line = 13 + mark.matches(';').count();
         let expected = format!(
-            "bad.toml:{line}: SubDevice \"2\": subdevice[2].{key}: {shown} offset {offset} is also the place of subdevice[0]"
+            "bad.toml:{line}: SubDevice \"2\": subdevice[2].{key}: {shown} offset {offset} is also the place of \
+             subdevice[0]"
         );
         assert_eq!(refusal(text), expected);
         if offset > 0 {
