@@ -26,8 +26,8 @@ impl<L: Links> Application<L, Inline> {
         self.acyclic.engine.snapshot()
     }
 
-    /// Whether all clocks that operation needs ([`ClockStatus::is_required`](crate::ClockStatus::is_required)) follow the
-    /// reference clock; false without clocks.
+    /// Whether all clocks follow the reference clock that operation needs
+    /// ([`ClockStatus::is_required`](crate::ClockStatus::is_required)); false without clocks.
     pub fn clocks_locked(&self) -> bool {
         self.acyclic.engine.clocks_locked()
     }
@@ -80,8 +80,8 @@ impl SupervisorThread {
         self.act(|engine| engine.are_pdos_awaited())
     }
 
-    /// Whether all clocks that operation needs ([`ClockStatus::is_required`](crate::ClockStatus::is_required)) follow the
-    /// reference clock; false without clocks.
+    /// Whether all clocks follow the reference clock that operation needs
+    /// ([`ClockStatus::is_required`](crate::ClockStatus::is_required)); false without clocks.
     ///
     /// # Errors
     /// The thread has ended.

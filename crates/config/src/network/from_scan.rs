@@ -109,8 +109,8 @@ fn names(found: &[SubDeviceInfo]) -> Vec<String> {
     found.iter().map(unique).collect()
 }
 
-/// Clocks with the reference that the engine takes where none is named, the first SubDevice with a clock. An ENI made of
-/// the file names it.
+/// Clocks with the reference that the engine takes where none is named, the first SubDevice with a clock. An ENI made
+/// of the file names it.
 fn clocks(found: &[SubDeviceInfo], names: &[String]) -> Clocks {
     let first = found.iter().position(|info| info.controller.features.dc);
     Clocks { reference: first.map(|index| names[index].clone()), ..Clocks::default() }
