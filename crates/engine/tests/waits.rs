@@ -45,7 +45,7 @@ const WAITS: [(&str, &[Reason]); 41] = [
     ("mail/reader.rs", &[Register]),
     ("mail/voe.rs", &[Register]),
     ("mail/writer.rs", &[Register]),
-    ("procedures/al_state.rs", &[Register, Register, Register]),
+    ("procedures/al_state.rs", &[Register, Register, Register, Register]),
     ("procedures/cabling.rs", &[Settle, Register, Settle, Retry]),
     ("procedures/clocks/drift.rs", &[Retry, Pace]),
     ("procedures/clocks/slide.rs", &[Pace]),

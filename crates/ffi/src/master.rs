@@ -333,8 +333,9 @@ impl Master {
         let bus = self.bus()?;
         let taken = self.application.use_within(CLAIM_LIMIT, Slot::take)?;
         let Active { mut application, .. } = taken.ok_or(Code::INVALID)?;
-        // Nothing reaches the SubDevices of a bus that the daemon has taken back.
-        let limit = if bus.check_held().is_ok() { END_LIMIT } else { Duration::ZERO };
+        // Nothing reaches the SubDevices of a bus that the daemon has taken back, which is in the log.
+        let is_held = bus.check_held().is_ok();
+        let limit = if is_held { END_LIMIT } else { Duration::ZERO };
         let mut draft = locked(&self.draft);
         for (number, words) in draft.domains().iter().enumerate() {
             words.set_memory(std::ptr::null_mut());
@@ -343,7 +344,9 @@ impl Master {
         let ended = match application.deactivate(LastOutputs::Zero, limit) {
             Ok(ended) => ended,
             Err(refused) => {
-                report(format_args!("master {}: {}", bus.master(), refused.error));
+                if is_held {
+                    report(format_args!("master {}: {}", bus.master(), refused.error));
+                }
                 refused.main_device
             }
         };

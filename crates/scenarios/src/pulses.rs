@@ -82,8 +82,8 @@ impl Pulses {
         let phases = phases?;
         let first = *phases.first()?;
         // One device may pulse before, the other after now.
-        let half = self.cycle_ns / 2;
-        let offset = |at: &u64| (at.wrapping_sub(first).wrapping_add(half) % self.cycle_ns) as i64 - half as i64;
+        let (cycle, half) = (self.cycle_ns as i64, self.cycle_ns as i64 / 2);
+        let offset = |at: &u64| (at.wrapping_sub(first) as i64 + half).rem_euclid(cycle) - half;
         let offsets: Vec<i64> = phases.iter().map(offset).collect();
         Some(offsets.iter().max()?.abs_diff(*offsets.iter().min()?))
     }

@@ -6,8 +6,8 @@
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
-use super::TimedEvent;
 use super::subject::Subjects;
+use super::{Event, TimedEvent};
 
 /// Largest number of clients: each event is copied for each of them.
 const MOST_CLIENTS: usize = 64;
@@ -81,6 +81,12 @@ impl Clients {
     /// Events of unknown subjects were lost.
     pub fn miss(&mut self, lost: u64) {
         self.all.iter_mut().for_each(|client| client.missed += lost);
+    }
+
+    /// An event is not kept: clients that asked for its subject miss it.
+    pub fn miss_one(&mut self, event: &Event) {
+        let subject = event.subject();
+        self.all.iter_mut().filter(|client| client.subjects.has(subject)).for_each(|client| client.missed += 1);
     }
 
     /// Queues an event for each client that asked for its subject.

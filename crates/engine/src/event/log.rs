@@ -133,6 +133,7 @@ impl EventLog {
         if matches!(event, Event::ForeignFrame { .. }) {
             if self.foreign >= FOREIGN_KEPT {
                 self.dropped += 1;
+                self.clients.miss_one(&event);
                 return;
             }
             self.foreign += 1;
@@ -253,6 +254,17 @@ mod tests {
         assert_eq!(kept.last().map(|event| event.number), Some(100), "dropped events have numbers, too");
         log.push(Instant(101), foreign());
         assert!(log.pop().is_some());
+    }
+
+    #[test]
+    fn a_client_learns_how_many_foreign_frames_it_missed_in_a_flood() {
+        let mut log = EventLog::default();
+        let all = log.add_client(Subjects::ALL, 200).expect("there is room");
+        let others = log.add_client(Subjects::ALL.without(foreign().subject()), 200).expect("there is room");
+        (0..100).for_each(|n| log.push(Instant(n), foreign()));
+        let of_all = log.take_of_client(all).expect("it is there");
+        assert_eq!((of_all.events.len(), of_all.missed), (FOREIGN_KEPT, 100 - FOREIGN_KEPT as u64));
+        assert_eq!(log.take_of_client(others), Some(ClientEvents::default()));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use core::fmt;
 use core::time::Duration;
 
 use ringcat_wire::address::StationAddress;
-use ringcat_wire::al::{AlControl, AlState, AlStatus, AlStatusCode};
+use ringcat_wire::al::{AlControl, AlState, AlStatus, AlStatusCode, transition_allowed};
 use ringcat_wire::register::{EscConfiguration, map};
 
 use crate::event::Subject;
@@ -18,6 +18,11 @@ const FIRST_PAUSE: Duration = Duration::from_micros(500);
 const LONGEST_PAUSE: Duration = Duration::from_millis(10);
 /// How long a SubDevice may take to clear its error bit after the acknowledgement.
 const ACKNOWLEDGE_LIMIT: Duration = Duration::from_millis(500);
+
+/// How long a request of a procedure that has ended is waited for.
+const PENDING_LIMIT: Duration = Duration::from_millis(500);
+/// Bytes from AL control to the end of AL status code.
+const CONTROL_TO_CODE: usize = (map::AL_STATUS.0 - map::AL_CONTROL.0) as usize + 6;
 
 /// How long a SubDevice may take to return its identification.
 const IDENTIFICATION_LIMIT: Duration = Duration::from_millis(50);
@@ -83,6 +88,28 @@ pub async fn read_status(bus: &Bus, station: StationAddress) -> Result<(AlStatus
     let (status, code) = split_status(&bytes);
     bus.post_al_status(station, status, code);
     Ok((status, code))
+}
+
+/// AL status after a request that is under way has ended: of a procedure that has ended meanwhile, or of another
+/// program. Until then the SubDevice shows the state before, which a request for that state would take for its own
+/// end; and it does not take another request before it has read that one (protocol 3.4). A state that its application
+/// has left by itself looks alike: the wait has a limit.
+pub(super) async fn read_quiet_status(bus: &Bus, station: StationAddress) -> Result<AlStatus, BusError> {
+    let until = bus.now() + PENDING_LIMIT;
+    let mut pause = FIRST_PAUSE;
+    loop {
+        let bytes: [u8; CONTROL_TO_CODE] = bus.fprd_array(station, map::AL_CONTROL).await?;
+        let [low, high, .., a, b, c, d, e, f] = bytes;
+        let (control, (status, code)) = (AlControl::decode(&[low, high]), split_status(&[a, b, c, d, e, f]));
+        bus.post_al_status(station, status, code);
+        let (from, to) = (status.al_state().filter(|_| !status.error), control.al_state());
+        let is_pending = from.zip(to).is_some_and(|(from, to)| from != to && transition_allowed(from, to));
+        if !is_pending || bus.now() >= until {
+            return Ok(status);
+        }
+        bus.sleep(pause).await;
+        pause = (pause * 3 / 2).min(LONGEST_PAUSE);
+    }
 }
 
 /// AL status (0x0130) and AL status code (0x0134) from the six bytes that contain both.

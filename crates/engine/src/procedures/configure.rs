@@ -108,7 +108,7 @@ impl BringUp<'_> {
     /// The FMMUs are cleared first: a SubDevice that leaves OP may process only part of its process data.
     async fn back_to_init(&self) -> Result<(), ConfigureError> {
         self.process_data(ProcessDataStep::Unmapped);
-        let (status, _) = al_state::read_status(self.bus, self.station).await?;
+        let status = al_state::read_quiet_status(self.bus, self.station).await?;
         let fmmus = vec![0; Fmmu::LEN * usize::from(self.setup.fmmu_count)];
         self.bus.fpwr(self.station, map::FMMU_BASE, &fmmus).await?;
         if status.error {

@@ -30,7 +30,7 @@ pub(crate) async fn visit(
         Ok(al_state::request(bus, station, to, emulated, limit).await?)
     };
     mailbox.close();
-    let (status, _) = al_state::read_status(bus, station).await?;
+    let status = al_state::read_quiet_status(bus, station).await?;
     if status.error {
         al_state::acknowledge(bus, station, emulated).await?;
     }

@@ -201,6 +201,54 @@ fn another_reference_is_chosen_during_the_set_up_of_the_clocks() {
     }
 }
 
+/// While SubDevices wait for the lock, samples of the reference before say nothing of another one: pulses are together
+/// from the first cycle in OP on, seen from inside the SubDevices.
+// covers: 7.5, dc-reference, dc-sync
+#[test]
+fn another_reference_is_chosen_while_the_lock_is_awaited() {
+    for (kind, count) in [("line", 2), ("tree", 5), ("ring", 2)] {
+        for begun in (50..400).step_by(50) {
+            let host = Host { base: EPOCH };
+            let mut world = World::with(51, network(kind, count), &Options::default(), |scan| {
+                let mut declaration = with_clocks(scan, config());
+                let signals = || Some(SyncSignals::sync0(CYCLE_NS as u32, 200_000));
+                declaration.subdevices.iter_mut().for_each(|subdevice| subdevice.sync = signals());
+                declaration
+            })
+            .expect("it can be activated");
+            world.application_mut().exchange_mut().set_clock_datagrams(ClockDatagrams::Called);
+            let mut cycles = 0;
+            while !world.all_in_op() {
+                if cycles == begun {
+                    let choice = ReferenceClock::Declared(SubDeviceId(1));
+                    world.application_mut().choose_reference_clock(choice);
+                }
+                call_and_cycle(&host, &mut world);
+                cycles += 1;
+                assert!(cycles < 8_000, "{kind} of {count}: {}", world.condition());
+            }
+            let mut pulses = Pulses::new(world.network(), 0..count, CYCLE_NS);
+            let mut apart = 0;
+            for _ in 0..300 {
+                call_and_cycle(&host, &mut world);
+                pulses.observe(world.network());
+                apart = pulses.apart_ns().expect("all pulse").max(apart);
+            }
+            let text = format!("{kind} of {count}, chosen after {begun}, in OP after {cycles}");
+            assert!(apart <= 1_000, "{text}: {apart} ns apart");
+        }
+    }
+}
+
+/// A cycle with both calls of the second policy.
+fn call_and_cycle(host: &Host, world: &mut World) {
+    let now = world.application().now();
+    let exchange = world.application_mut().exchange_mut();
+    exchange.sync_reference(now);
+    exchange.sync_clocks();
+    host.cycle(world);
+}
+
 /// Another reference while pulses run: pulses go on, and all clocks follow the chosen one.
 // covers: 7.5, dc-reference
 #[test]

@@ -28,6 +28,7 @@ mod crossed_rings;
 mod cycle_parts;
 mod data_words;
 mod deactivate;
+mod deactivate_moments;
 mod declared_sync_managers;
 mod determinism;
 mod disturbed_frames;

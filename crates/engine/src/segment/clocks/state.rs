@@ -302,9 +302,13 @@ impl Clocks {
         preferred.or_else(|| candidates().next()).map(|node| node.station)
     }
 
-    /// Makes a clock the reference, or none.
+    /// Makes a clock the reference, or none. Clocks that were not all locked are not near each other: samples against
+    /// another reference, which was in its own window, say nothing of this one.
     pub(in crate::segment) fn refer_to(&mut self, reference: Option<StationAddress>) {
         let is_other = core::mem::replace(&mut self.reference, reference) != reference;
+        if is_other && self.is_any_outside() {
+            self.nodes.iter_mut().for_each(|node| (node.good, node.difference_ns, node.average) = (0, None, None));
+        }
         self.changes.delays = self.changes.delays.wrapping_add(u32::from(is_other));
     }
 
