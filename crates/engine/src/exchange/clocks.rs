@@ -14,6 +14,7 @@ use ringcat_wire::register::{EcatEvent, map};
 mod calls;
 mod gap;
 mod lead;
+mod rate;
 mod slide;
 
 use crate::board::Board;
@@ -27,6 +28,7 @@ use crate::time::Instant;
 use calls::Calls;
 pub use calls::ClockDatagrams;
 use lead::Lead;
+use rate::Rate;
 use slide::Slide;
 
 /// Data of each datagram: the low half of a time.
@@ -174,6 +176,8 @@ pub(crate) struct Clocks {
     times: [Option<ReferenceTime>; 2],
     /// Last reading, used while there is no reference.
     last: Option<ReferenceTime>,
+    /// Rate of the segment's reference.
+    rate: Rate,
     /// Difference between the steered reference and the segment's reference.
     lead: Option<Lead>,
     /// Difference between the segment's reference and the time that it is to follow, and its last value.
@@ -253,7 +257,8 @@ impl Clocks {
         let [main, redundant] = self.times;
         let (own, other) = if link == Link::Main { (main, redundant) } else { (redundant, main) };
         let unread = || self.application_time(now).wrapping_sub(self.slide.in_effect());
-        let read = own.or(other).or(self.last).map(|time| time.at(now));
+        let gained = |time: ReferenceTime| self.rate.gained(now.0.saturating_sub(time.sent_at.0));
+        let read = own.or(other).or(self.last).map(|time| time.at(now).wrapping_add(gained(time)));
         read.or_else(|| self.slide.posted_time(now)).unwrap_or_else(unread)
     }
 
@@ -299,6 +304,7 @@ impl Clocks {
         let leader = |references: References| references.leader().0.and_then(|link| references.on(link));
         if leader(references) != leader(self.references) {
             self.behind = None;
+            self.rate.restart();
         }
         (self.references, self.changes) = (references, changes);
         board.clocks.times.take(changes);
@@ -307,6 +313,7 @@ impl Clocks {
     /// The system time has jumped since the references were read.
     #[cold]
     fn move_times(&mut self, jump: u64) {
+        self.rate.restart();
         let times = self.times.iter_mut().chain([&mut self.last, &mut self.led]).flatten();
         times.for_each(|time| time.time = time.time.wrapping_add(jump));
         self.written_epoch = self.written_epoch.map(|written| written.wrapping_add(jump));
@@ -439,6 +446,7 @@ impl Clocks {
             self.times[link.index()] = Some(ReferenceTime { time, sent_at: seen.sent_at });
             fresh += 1;
             if leader == Some(link) {
+                self.rate.read(time, seen.sent_at);
                 self.observe_led(time, seen.sent_at);
             }
         }

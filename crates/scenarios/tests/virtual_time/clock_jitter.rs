@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use ringcat::{Event, Options, ReferenceClock, SubDeviceId, SyncSignals};
+use ringcat::{Event, Options, ReferenceClock, SubDeviceId, SyncSignals, automatic};
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::al::AlState;
@@ -122,6 +122,36 @@ fn a_clock_without_sync_in_front_of_the_reference_holds_nothing_back() {
             let [apart] = watch(&mut world, [&behind], 3_000);
             assert!(apart <= 100, "{text}: {apart} ns apart");
             assert_eq!((window_events(&world, mark), world.left_op(mark)), (0, Vec::new()), "{text}");
+        }
+    }
+}
+
+/// SubDevices with SYNC signals in front of the reference follow its predicted time: the prediction has the rate of the
+/// reference, so that they lock and are as exact as those behind, whatever the cycle.
+// covers: 7.2, 7.3, dc-reference
+#[test]
+fn clocks_in_front_of_the_reference_lock_and_are_exact_in_short_and_long_cycles() {
+    // Clocks that differ by more than 150 ppm swing around the prediction (docs/dc.md): a drive has a crystal of 50 ppm.
+    for (count, ppm, cycle_us) in [(2, 50, 1_000), (3, 50, 1_000), (10, 50, 250), (10, 50, 4_000), (3, 50, 4_000)] {
+        for closed in [false, true] {
+            let text = format!("{count} of {ppm} ppm, ring {closed}, each {cycle_us} us");
+            let (descriptions, options) = (clocked(count, ppm), NetworkOptions::default());
+            let network = if closed { ring(descriptions, options) } else { line(descriptions, options) };
+            let cycle = Duration::from_micros(cycle_us);
+            let mut world = World::with(52, network, &Options::default(), |scan| {
+                let chosen = config().with_reference(ReferenceClock::Declared(SubDeviceId(count - 1)));
+                let mut declaration = automatic(&scan.subdevices, cycle).with_clocks(chosen);
+                let signals = Some(SyncSignals::sync0(cycle_us as u32 * 1_000, 0));
+                declaration.subdevices.iter_mut().for_each(|subdevice| subdevice.sync = signals);
+                declaration
+            })
+            .expect("it can be activated");
+            world.until(Duration::from_secs(4), &text, World::all_in_op);
+            let (in_op, all) = (world.now(), (0..count).collect::<Vec<_>>());
+            world.run_cycles(2_000_000 / cycle_us);
+            let [apart] = watch(&mut world, [&all], 2_000_000 / cycle_us);
+            println!("{text}: in OP after {} ms, {apart} ns apart", in_op.0 / 1_000_000);
+            assert!(apart <= 100, "{text}: {apart} ns apart");
         }
     }
 }
