@@ -83,7 +83,7 @@ impl<'a> Session<'a> {
         self.write_text(&fmt::format(text))
     }
 
-    /// Writes a value of a SubDevice: its bytes to a program, text to a terminal, which shows no zero bytes.
+    /// Writes a value of a SubDevice: its bytes to a program, text without zero bytes to a terminal.
     ///
     /// # Errors
     /// The output is closed.

@@ -213,7 +213,7 @@ impl Master {
         if self.is_active() {
             return Err(Code::BUSY);
         }
-        // By these words the bus tells which SubDevice is which.
+        // SubDevices are identified by these words.
         let words = self.bus()?.supervisor().learn_data_words(file.declared());
         words.map_err(|_| Code::GONE)?;
         self.refresh()?;

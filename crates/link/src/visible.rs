@@ -1,12 +1,12 @@
 //! Text of devices, files and other programs, as a terminal may show it.
 //!
-//! A name in an EEPROM or a file can contain characters that a terminal obeys, or that change the direction or the
-//! lines of what it shows. Programs pass all text for operators through [`visible`], and lines of JSON through
-//! [`visible_json`]. The one list of such characters is [`is_hidden`].
+//! A name in an EEPROM or a file can contain characters that a terminal interprets as commands, or that change the
+//! direction or the lines of a text (bidirectional formatting, line separators). Programs pass all text for operators
+//! through [`visible`], and lines of JSON through [`visible_json`]. The one list of such characters is [`is_hidden`].
 
 use std::fmt::Write;
 
-/// Formats and separators: first and last.
+/// Format characters and separators: first and last of each range.
 const HIDDEN: [(char, char); 13] = [
     ('\u{AD}', '\u{AD}'),
     ('\u{61C}', '\u{61C}'),
@@ -20,13 +20,13 @@ const HIDDEN: [(char, char); 13] = [
     ('\u{1BCA0}', '\u{1BCA3}'),
     ('\u{1D173}', '\u{1D17A}'),
     ('\u{E0000}', '\u{E00FF}'),
-    // Selectors of variants (U+E0100 to U+E01EF) belong to the character before them.
+    // Variation selectors (U+E0100 to U+E01EF) belong to the character before them.
     ('\u{E01F0}', '\u{E0FFF}'),
 ];
 
-/// Whether a character has no picture of its own, but changes the state of a terminal, or the direction or the lines of
-/// a text: controls, line and paragraph separators, formats (Unicode Cc, Zl, Zp, Cf). Line feeds and tabs do not count,
-/// nor do marks of Arabic and Syriac numbers, which are shown.
+/// Whether a character has no glyph of its own, but changes the state of a terminal, or the direction or the lines of a
+/// text: control characters, line and paragraph separators, format characters (Unicode categories Cc, Zl, Zp, Cf). Not
+/// hidden are line feeds and tabs, nor Arabic number signs and the Syriac abbreviation mark, which are visible.
 #[inline(never)]
 pub fn is_hidden(c: char) -> bool {
     if c < '\u{AD}' {

@@ -240,7 +240,7 @@ fn written_files_count_subdevices_down_and_read_identities_by_word() {
     let eni = exported();
     let places: Vec<u16> = eni.subdevices.iter().take(4).filter_map(|it| it.auto_increment).collect();
     assert_eq!(places, [0, 65535, 65534, 65533]);
-    // Those without an identity in the network file have none to compare.
+    // SubDevices without an identity in the network file have no identity to compare.
     let expected = network(CELL).configuration().declaration.subdevices;
     let expected = expected.iter().filter(|it| it.expected.vendor_id.is_some() && it.expected.product_code.is_some());
     let (expected, mut compared) = (expected.count(), 0);

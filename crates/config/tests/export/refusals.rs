@@ -162,7 +162,8 @@ fn a_sync_manager_without_a_table_beside_others_is_listed() {
         // Without the mailbox, the numbers show it.
         file.subdevice[DRIVE].mailbox = None;
         assert_eq!(listed(&file), one(number));
-        // A table without a length and without PDOs declares that there is none; a length of 0 leaves it to the EEPROM.
+        // A table without a length and without PDOs declares that there is no process data; a length of 0 leaves it to
+        // the EEPROM.
         for (length, expected) in [(None, vec![]), (Some(0), one(number))] {
             let mut file = network(CELL);
             let table = &mut file.subdevice[DRIVE].sync_manager[at];
@@ -181,7 +182,7 @@ fn a_sync_manager_without_a_table_beside_others_is_listed() {
     assert_eq!(what, "sync_manager 1");
 }
 
-/// Sent after the PDOs, the commands undo the tables.
+/// Commands that are sent after the PDOs undo the tables.
 // covers: eni-run, ES-125
 #[test]
 fn start_up_commands_that_leave_other_process_data_than_the_tables_are_refused() {

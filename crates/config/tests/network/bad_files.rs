@@ -230,7 +230,7 @@ fn two_subdevices_at_one_port_are_refused_unless_they_take_turns() {
     NetworkFile::read("turns.toml", file("optional = true").as_bytes()).expect("one of them may be absent");
 }
 
-/// A file of SubDevices with these keys, in an order with lines of their own.
+/// A file of SubDevices with these keys, each key in a line of its own.
 fn marked(subdevices: &[&str]) -> String {
     let head = "ringcat_network = 1\n[[domain]]\nname = \"d\"\nperiod = \"1ms\"\n";
     let subdevices = subdevices.iter().enumerate();

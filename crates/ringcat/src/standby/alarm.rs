@@ -1,5 +1,5 @@
-//! An INACTIVE that waits for an ACTIVE raises an alarm if none sends process data: outputs then no longer change, or
-//! their watchdogs have expired.
+//! An INACTIVE raises an alarm if no ACTIVE sends process data: outputs then no longer change, or their watchdogs have
+//! expired.
 
 use std::time::Duration;
 

@@ -84,8 +84,9 @@ fn sync0_stays_synchronous_through_cuts_with_a_host_50_us_late() {
     }
 }
 
-/// The sender is on average 200 us late: clocks in front of the reference follow it by its estimate, and do not lock.
-/// Without SYNC signals nothing waits for them, and the others are as exact as ever; with signals they wait themselves.
+/// The sender is on average 200 us late: clocks in front of the reference follow the estimate of the host, and do not
+/// lock. Without SYNC signals no SubDevice waits for them, and the other clocks are as exact as before; with SYNC
+/// signals these SubDevices wait in SAFEOP.
 // covers: 7.2, 7.3, dc-late-host
 #[test]
 fn a_clock_without_sync_in_front_of_the_reference_holds_nothing_back() {

@@ -183,7 +183,7 @@ fn pulses_go_on_through_a_jump_of_the_application_time_and_reach_their_phase_in_
     }
 }
 
-/// A choice counts at any time, also while delays are measured.
+/// A choice takes effect at any time, also while delays are measured.
 // covers: 7.5, dc-reference
 #[test]
 fn another_reference_is_chosen_during_the_set_up_of_the_clocks() {
@@ -347,8 +347,8 @@ fn clocks_follow_calls_and_run_free_without() {
     }
 }
 
-/// Nothing is read of the reference: it has the time that was written last. The application's time runs 300 ppm faster
-/// than the host's, and jumps in the end.
+/// The reference is not read: it has the time that was written last. The application's time runs 300 ppm faster than
+/// the host's, and jumps in the end.
 // covers: 7.4, dc-reference
 #[test]
 fn a_reference_that_alone_is_called_for_follows_a_time_that_drifts() {
@@ -422,7 +422,7 @@ fn unlocked_clocks_are_a_warning_after_5_s_or_a_stay_in_safeop() {
     }
 }
 
-/// The clock that is too far has SYNC signals itself: it waits once, and is reported once.
+/// The SubDevice whose clock is too far off has SYNC signals itself: it waits once, and is reported once.
 // covers: 7.3, dc-sync
 #[test]
 fn an_unlocked_clock_with_signals_of_its_own_goes_on_after_5_s_with_one_warning() {

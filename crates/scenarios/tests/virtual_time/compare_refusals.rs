@@ -153,7 +153,7 @@ fn clocks_of_a_network_without_any_are_named() {
     assert_eq!(checked(&file_of(bus, |_| ()), bus), []);
 }
 
-/// A run refuses it on two interfaces, and splits it on request.
+/// A run refuses the LRW on two interfaces, and splits it on request.
 // covers: network-file, eni-run
 #[test]
 fn an_lrw_over_several_subdevices_is_named_on_two_interfaces() {
@@ -382,7 +382,7 @@ fn an_eni_of_a_file_without_revisions_and_identities_has_no_difference() {
     }
 }
 
-/// The description of modules is not in an SII; that the ENI has no SyncManager is a difference nevertheless.
+/// An SII does not describe modules; a SyncManager that is missing in the ENI is a difference nevertheless.
 // covers: network-file, eni-run, ES-69
 #[test]
 fn process_data_that_an_eni_does_not_have_of_a_subdevice_with_modules_is_named() {

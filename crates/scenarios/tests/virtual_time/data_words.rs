@@ -13,12 +13,12 @@ use scenarios::world::{CYCLE, World};
 
 use crate::hot_connect::{LIMIT, infos};
 
-/// The word, in process RAM.
+/// Address of the word, in process data RAM.
 const WORD: RegisterAddress = RegisterAddress(0x1000);
 const BASE: [&str; 2] = ["coupler", "digital-output-8"];
 const TWIN: &str = "digital-output-16";
 
-/// The base, with twins behind its first SubDevice that differ by the word only.
+/// The base, and behind its first SubDevice two equal SubDevices that differ by the word only.
 fn devices(words: [u16; 2]) -> Vec<DeviceDescription> {
     let mut devices = descriptions(&[BASE[0], TWIN, TWIN, BASE[1]]);
     for (device, word) in devices[1..3].iter_mut().zip(words) {
@@ -85,7 +85,7 @@ fn twins_with_the_same_word_are_ambiguous_and_another_word_finds_none() {
         let network = line(devices(words), NetworkOptions::default());
         let mut main_device = MainDevice::request(Tap::new(network), &Options::default());
         let mut scan = main_device.scan().expect("a scan");
-        assert!(scan.subdevices.iter().all(|info| info.data_words.is_empty()), "nothing has asked for a word");
+        assert!(scan.subdevices.iter().all(|info| info.data_words.is_empty()), "no declaration needs a word");
         let mut declaration = declare(&scan);
         main_device.read_data_words(&declaration.subdevices, &mut scan);
         let read: Vec<Option<u16>> = scan.subdevices.iter().map(|info| info.data_word(WORD)).collect();

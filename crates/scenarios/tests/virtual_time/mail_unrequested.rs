@@ -243,7 +243,7 @@ fn emergencies_are_kept_by_position_and_wait_in_an_undeclared_subdevice() {
     assert!(application.all_settled() && by_position.is_empty());
 }
 
-/// With idle operation, one device after the other; behind one without power, positions change in a ring.
+/// With idle operation, one device after the other; in a ring, positions change behind a device without power.
 // covers: 6.3, sdo-information
 #[test]
 fn emergencies_of_a_position_go_on_after_a_power_cycle_without_a_declaration() {
