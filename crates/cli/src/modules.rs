@@ -146,7 +146,7 @@ mod tests {
 
     // covers: ES-69
     #[test]
-    fn the_reads_of_a_list_of_modules_have_one_limit_and_what_is_left_is_named() {
+    fn the_reads_of_a_module_list_have_one_limit_and_unread_slots_are_reported() {
         let (all, _) = read(Ok(255), Duration::from_millis(20));
         assert_eq!((all.whole().map(<[u32]>::len), all.unread()), (Some(255), None));
         let (some, time) = read(Ok(255), Duration::from_secs(3));

@@ -34,7 +34,7 @@ mod tests {
 
     // covers: dc-sync, c-interface
     #[test]
-    fn the_first_time_begins_the_grid_and_the_last_one_goes_on() {
+    fn the_grid_begins_with_the_first_time_and_the_time_continues_from_the_last() {
         let mut given = Given::default();
         given.set(0);
         assert!(given.first.is_none() && given.last.is_none());

@@ -72,7 +72,7 @@ mod tests {
 
     // covers: verdict
     #[test]
-    fn control_characters_of_files_and_devices_are_shown_and_not_obeyed() {
+    fn control_characters_of_files_and_devices_are_escaped() {
         for text in ["", "plain", "two\nlines\tand a column", "Ger\u{e4}t \u{4e2d}\u{3000}e\u{301} \u{1F600}"] {
             assert_eq!((visible(text), visible_json(text)), (text.to_owned(), text.to_owned()));
         }
@@ -82,7 +82,7 @@ mod tests {
 
     // covers: verdict
     #[test]
-    fn separators_and_formats_are_shown_in_text_and_in_json() {
+    fn separators_and_format_characters_are_escaped_in_text_and_in_json() {
         let hidden = "\u{ad}\u{61c}\u{180e}\u{200b}\u{200d}\u{200e}\u{200f}\u{2028}\u{2029}\u{202a}\u{2060}\u{206f}\
                       \u{feff}\u{fff9}\u{1d173}\u{e0001}\u{e007f}";
         for c in hidden.chars() {

@@ -245,7 +245,7 @@ mod tests {
 
     // covers: daemon
     #[test]
-    fn a_silent_owner_is_named_after_a_second_and_holds_a_bounded_number_of_queries() {
+    fn a_silent_owner_is_reported_after_a_second_and_its_queries_are_bounded() {
         let (owner, _far) = for_tests().expect("a pair");
         let owner = Arc::new(owner);
         let begin = Instant::now();
@@ -269,7 +269,7 @@ mod tests {
 
     // covers: daemon
     #[test]
-    fn answers_reach_their_queries_in_any_order_and_late_ones_nothing() {
+    fn answers_reach_their_queries_in_any_order_and_late_ones_are_dropped() {
         let (owner, far) = for_tests().expect("a pair");
         let owner = Arc::new(owner);
         let asking = owner.clone();

@@ -137,7 +137,7 @@ fn unusual_files_are_read_and_noted() {
 
 // covers: esi-read, ES-15, ES-20
 #[test]
-fn second_definitions_and_names_of_nothing_are_notices_with_their_lines() {
+fn duplicate_definitions_and_undefined_names_are_notices_with_their_lines() {
     let acme = ACME;
     let object = "<Object><Index>#x8000</Index><Name>Second</Name><Type>UDINT</Type><BitSize>32</BitSize></Object>";
     let group = "<Group SortOrder=\"30\"><Type>AcmeIo</Type><Name>Second</Name></Group></Groups>";

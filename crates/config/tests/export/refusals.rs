@@ -121,7 +121,7 @@ fn settings_that_an_eni_has_no_place_for_are_listed() {
 /// a scan or a description.
 // covers: eni-run
 #[test]
-fn mailboxes_left_to_the_eeprom_are_listed_if_a_subdevice_may_need_one() {
+fn mailboxes_left_to_the_eeprom_are_listed_if_a_subdevice_may_need_them() {
     let listed = |file: &NetworkFile| -> Vec<(Option<usize>, String)> {
         let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
         let left_out = export.left_out.into_iter().filter(|it| it.what == "mailbox");

@@ -240,7 +240,7 @@ fn marked(subdevices: &[&str]) -> String {
 
 // covers: network-file
 #[test]
-fn a_mark_that_two_subdevices_have_is_refused_with_its_line() {
+fn two_subdevices_with_one_identifier_are_refused_with_the_line() {
     let word = "identification = 7; identification_word = 0x1000";
     for (mark, shown, key) in [
         ("alias = 7", "alias 7", "alias"),

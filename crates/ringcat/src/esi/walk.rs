@@ -177,7 +177,7 @@ mod tests {
 
     // covers: esi-read
     #[test]
-    fn links_in_circles_lead_to_each_folder_and_file_once() {
+    fn circular_links_give_each_folder_and_file_once() {
         let place = Place::new("circles");
         place.folder("vendor/more");
         for name in ["one.xml", "vendor/two.xml", "vendor/more/three.XML", "notes.txt"] {

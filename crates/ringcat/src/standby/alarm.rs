@@ -58,7 +58,7 @@ mod tests {
 
     // covers: REQ032, 9.11, standby
     #[test]
-    fn a_missing_active_is_reported_once_and_its_return_too() {
+    fn a_missing_active_and_its_return_are_each_reported_once() {
         let mut lookout = Lookout::new(at(100));
         assert_eq!(lookout.note(None, LIMIT, at(114)), None);
         assert_eq!(lookout.note(None, LIMIT, at(115)), Some(CyclicStandbyEvent::NoActive(LIMIT)), "it never came");

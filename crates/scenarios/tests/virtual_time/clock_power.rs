@@ -40,7 +40,7 @@ fn ahead_ns(world: &World, device: usize) -> i64 {
 /// No clock has the time any more: it continues with the time of the host.
 // covers: 7.2, dc-reference
 #[test]
-fn the_system_time_goes_on_after_all_subdevices_have_lost_their_power() {
+fn the_system_time_continues_after_all_subdevices_have_lost_their_power() {
     for (kind, count) in SEGMENTS {
         for (off_ms, apart_ms) in [(40, 0), (400, 0), (40, 3), (40, 120)] {
             let text = format!("{kind} of {count}, {off_ms} ms without power, one each {apart_ms} ms");

@@ -351,7 +351,7 @@ fn clocks_follow_calls_and_run_free_without() {
 /// the host's, and jumps in the end.
 // covers: 7.4, dc-reference
 #[test]
-fn a_reference_that_alone_is_called_for_follows_a_time_that_drifts() {
+fn a_reference_that_alone_is_steered_follows_a_time_that_drifts() {
     for (kind, count) in SEGMENTS.into_iter().take(4) {
         let mut world = world(48, network(kind, count), config());
         world.application_mut().exchange_mut().set_clock_datagrams(ClockDatagrams::Called);
@@ -425,7 +425,7 @@ fn unlocked_clocks_are_a_warning_after_5_s_or_a_stay_in_safeop() {
 /// The SubDevice whose clock is too far off has SYNC signals itself: it waits once, and is reported once.
 // covers: 7.3, dc-sync
 #[test]
-fn an_unlocked_clock_with_signals_of_its_own_goes_on_after_5_s_with_one_warning() {
+fn a_subdevice_with_an_unlocked_clock_continues_after_5_s_with_one_warning() {
     let mut descriptions = clocked(4, 50);
     descriptions[3].clock_drift_ppb = 900_000;
     let mut world = World::with(47, wired_as("line", descriptions), &Options::default(), |scan| {

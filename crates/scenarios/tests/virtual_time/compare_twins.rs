@@ -119,7 +119,7 @@ const BUS: [&str; 3] = ["coupler", "servo=7", "digital-output-8"];
 
 // covers: network-file
 #[test]
-fn twins_of_a_declared_subdevice_prevent_op_and_both_are_named() {
+fn duplicates_of_a_declared_subdevice_prevent_op_and_both_are_reported() {
     for kind in KINDS {
         let network = file_of(&BUS, kind, |file| kind.declare(&mut file.subdevice[1], 7));
         assert_eq!(short(&checked(&network, &BUS, kind)), [], "{kind:?}");
@@ -137,7 +137,7 @@ fn twins_of_a_declared_subdevice_prevent_op_and_both_are_named() {
 
 // covers: network-file
 #[test]
-fn the_declared_device_is_compared_and_not_its_twin() {
+fn the_declared_device_is_compared_and_not_its_duplicate() {
     let bus = ["coupler", "digital-output-8", "servo=7"];
     for kind in KINDS {
         let network = file_of(&bus, kind, |file| kind.declare(&mut file.subdevice[2], 7));
@@ -148,7 +148,7 @@ fn the_declared_device_is_compared_and_not_its_twin() {
 
 // covers: network-file, hot-connect
 #[test]
-fn twins_of_a_group_leave_it_absent_and_are_named_once() {
+fn duplicates_of_a_group_head_leave_the_group_absent_and_are_reported_once() {
     let bus = ["coupler", "digital-output-8", "servo=7", "digital-input-8"];
     let grouped = |kind: Kind, required: Required| {
         file_of(&bus, kind, move |file| {
@@ -210,7 +210,7 @@ fn random_file(file: &mut NetworkFile, bus: &[String], kind: Kind, dice: &mut Di
 
 // covers: network-file, hot-connect
 #[test]
-fn random_twins_are_marked_as_the_activation_decides() {
+fn random_duplicates_are_marked_as_the_activation_decides() {
     let (seeds, mut with_twins) = (from_environment().unwrap_or(0..60), 0);
     for seed in seeds.clone() {
         let mut dice = Dice::new(seed);

@@ -55,7 +55,7 @@ fn places(world: &World) -> Vec<Option<usize>> {
 
 // covers: 4.3, 8.2, hot-connect
 #[test]
-fn twins_are_told_apart_by_a_word_that_their_sii_does_not_name() {
+fn equal_subdevices_are_identified_by_a_word_that_their_sii_does_not_name() {
     for (words, expected) in [([7, 8], [0, 3, 1, 2]), ([8, 7], [0, 3, 2, 1])] {
         let mut world = world(words);
         world.settle();
@@ -80,7 +80,7 @@ fn twins_are_told_apart_by_a_word_that_their_sii_does_not_name() {
 
 // covers: 4.3, 8.2, hot-connect
 #[test]
-fn twins_with_the_same_word_are_ambiguous_and_another_word_finds_none() {
+fn equal_subdevices_with_one_word_are_ambiguous_and_another_word_finds_none() {
     for (words, present) in [([7, 7], 0), ([7, 9], 1)] {
         let network = line(devices(words), NetworkOptions::default());
         let mut main_device = MainDevice::request(Tap::new(network), &Options::default());

@@ -257,7 +257,7 @@ fn a_failed_configuration_waits_for_a_request_with_that_policy() {
 /// again. Evaluated by the states inside the SubDevices.
 // covers: stop, refused-states
 #[test]
-fn a_late_request_of_another_program_ends_no_configuration() {
+fn a_late_request_of_another_program_does_not_end_a_configuration() {
     const FAST: Duration = Duration::from_micros(100);
     for state in [AlState::Init, AlState::PreOp] {
         let mut refused = 0;
@@ -441,7 +441,7 @@ fn closed(network: &Network) -> usize {
 /// A SubDevice hangs while it is brought to PREOP, and then no frame returns.
 // covers: stop
 #[test]
-fn a_deactivation_that_no_frame_confirms_is_no_success() {
+fn a_deactivation_succeeds_only_if_frames_confirm_it() {
     const SHORT: Duration = Duration::from_millis(100);
     for after in (0..60).map(|half| Duration::from_micros(500 * half)) {
         for network in networks() {

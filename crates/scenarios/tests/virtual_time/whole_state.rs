@@ -201,7 +201,7 @@ fn a_client_gets_each_event_of_a_cycle_although_the_application_fetches_none() {
 
 // covers: jobs
 #[test]
-fn each_event_of_a_cycle_has_a_number_although_none_asks_for_it() {
+fn each_event_of_a_cycle_has_a_number_without_a_request_for_it() {
     for cycles in [400, 3_000, 12_000] {
         let (mut application, number, raised) = disturbed(cycles, u64::MAX, &mut Vec::new());
         // Events that are not in the result were missed.

@@ -234,7 +234,7 @@ impl Links for Flickering {
 
 // covers: states
 #[test]
-fn a_segment_that_changes_after_each_scan_is_given_up_with_a_reason() {
+fn resume_fails_with_a_reason_if_the_segment_changes_after_each_scan() {
     for handover in HANDOVERS {
         let instantly = NetworkOptions::default().with_detection_delay(Duration::ZERO);
         let former = idle(line(descriptions(&["servo", "digital-input-8"]), instantly));
