@@ -125,7 +125,7 @@ impl EmergencyRing {
 #[derive(Debug, Default)]
 pub(crate) struct EmergencyRings {
     rings: BTreeMap<Address, EmergencyRing>,
-    /// Ring buffers of positions that SubDevices have left; kept while the positions of other SubDevices change.
+    /// Ring buffers of positions that SubDevices have left, as long as other SubDevices have these positions.
     left: BTreeMap<Position, EmergencyRing>,
 }
 

@@ -37,7 +37,7 @@ fn ahead_ns(world: &World, device: usize) -> i64 {
     time.wrapping_sub(EPOCH).wrapping_sub(network.now().0) as i64
 }
 
-/// No clock has the time any more: it continues with the time of the host.
+/// No clock has kept the system time: the system time continues with the time of the host.
 // covers: 7.2, dc-reference
 #[test]
 fn the_system_time_continues_after_all_subdevices_have_lost_their_power() {

@@ -201,8 +201,8 @@ fn another_reference_is_chosen_during_the_set_up_of_the_clocks() {
     }
 }
 
-/// While SubDevices wait for the lock, samples of the reference before say nothing of another one: pulses are together
-/// from the first cycle in OP on, seen from inside the SubDevices.
+/// While SubDevices wait for the lock, samples against the previous reference are not valid for another one: pulses are
+/// together from the first cycle in OP on, measured inside the SubDevices.
 // covers: 7.5, dc-reference, dc-sync
 #[test]
 fn another_reference_is_chosen_while_the_lock_is_awaited() {

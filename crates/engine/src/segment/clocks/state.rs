@@ -302,8 +302,8 @@ impl Clocks {
         preferred.or_else(|| candidates().next()).map(|node| node.station)
     }
 
-    /// Makes a clock the reference, or none. Clocks that were not all locked are not near each other: samples against
-    /// another reference, which was in its own window, say nothing of this one.
+    /// Makes a clock the reference, or none. If not all clocks were locked, they are not near each other: samples
+    /// against another reference are not valid for this one.
     pub(in crate::segment) fn refer_to(&mut self, reference: Option<StationAddress>) {
         let is_other = core::mem::replace(&mut self.reference, reference) != reference;
         if is_other && self.is_any_outside() {

@@ -13,7 +13,7 @@ use scenarios::world::CYCLE;
 use super::{ONE, one_ring};
 
 const SECOND: Duration = Duration::from_secs(1);
-/// Time after the start of an application within which ports are open: a frame that was sent before may still close
+/// Time from the start of an application until all ports must be open: a frame that was sent before may still close
 /// ports, another one opens them.
 const OPENED: Duration = Duration::from_millis(5);
 /// Maximum duration of the start of an application.
