@@ -56,7 +56,7 @@ pub struct Bus {
     pub modules: Vec<Vec<u32>>,
     /// Idents of the modules of each SubDevice if its list was read completely.
     pub lists: Vec<Option<Vec<u32>>>,
-    /// SubDevices without a list of modules, by their answer.
+    /// Whether each SubDevice has answered that it has no list of modules.
     pub unlisted: Vec<bool>,
     /// A declared ring behind a junction that does not close.
     pub not_closed: Option<JunctionError>,
@@ -75,7 +75,7 @@ pub struct Wanted {
 
 impl BusArguments {
     /// Scans. `declared` is the network that is expected: its rings behind junctions are tested. `wanted` decides what
-    /// else is read from each SubDevice, which goes to PREOP for it and back to INIT.
+    /// else is read from each SubDevice, which is brought to PREOP for this, and back to INIT.
     pub fn scan(
         &self,
         declared: Option<&Configuration>,

@@ -137,8 +137,8 @@ impl ClockOptions {
         self.check(&[], &[], cycle.as_nanos() as u64).map_err(Failure::new)
     }
 
-    /// As [`ClockOptions::declare`] for the declaration of a file, for which [`ClockOptions::check_with_file`] was
-    /// asked: master shift or bus shift and estimated delays are options.
+    /// As [`ClockOptions::declare`] for the declaration of a file, after [`ClockOptions::check_with_file`]: only master
+    /// shift or bus shift and estimated delays are taken from the options.
     pub fn adapt(&self, declaration: &mut Declaration) {
         let Some(config) = &mut declaration.clocks else { return };
         config.epoch = system_time::epoch(now());

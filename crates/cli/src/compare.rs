@@ -124,7 +124,7 @@ fn print(differences: &[ringcat::eni::Difference]) {
     }
 }
 
-/// What is read of a found SubDevice with this index in the file.
+/// What is to be read of a found SubDevice with this index in the file.
 fn wanted(
     configuration: &Configuration,
     stated: &[Stated],

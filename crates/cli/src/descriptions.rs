@@ -31,8 +31,8 @@ pub struct EsiArgument {
     esi: Option<PathBuf>,
     /// Language of the names of descriptions: 1033 English, 1031 German
     ///
-    /// A name that a description does not have in it is that of the same language in another country, the English or
-    /// the first.
+    /// If a description does not have a name in this language, its name in the same language of another country is
+    /// used, else the English name, else the first one.
     #[arg(long, value_name = "LCID", requires = "esi", help_heading = "Output")]
     language: Option<u32>,
 }
@@ -131,7 +131,7 @@ fn found_and_described(
 pub struct Descriptions {
     folder: EsiFolder,
     loaded: Vec<(String, Rc<Esi>)>,
-    /// Of their names.
+    /// Language of their names.
     pub language: u32,
 }
 

@@ -1,5 +1,5 @@
-//! The modules that a device has detected, by the list in its dictionary: read within a time limit, with a report of
-//! what was not read.
+//! The modules that a device has detected, from the list in its dictionary: they are read within a time limit, and
+//! slots that were not read are reported.
 
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -17,7 +17,7 @@ const LIMIT: Duration = Duration::from_secs(10);
 /// The modules that a device detects.
 #[derive(Debug, Default)]
 pub struct Detected {
-    /// Their idents by slot, as far as they were read.
+    /// Their idents by slot, up to the first that was not read.
     pub idents: Vec<u32>,
     /// What was read.
     pub list: List,
@@ -45,7 +45,7 @@ pub enum List {
 /// Why a read failed.
 #[derive(Debug)]
 pub enum Failed {
-    /// The device has no such object, by its answer.
+    /// The device has answered that the object does not exist.
     NoObject,
     /// No answer, another abort code, or another fault.
     Otherwise(String),
@@ -64,8 +64,8 @@ impl From<Error> for Failed {
     }
 }
 
-/// Reads the list. `elapsed` is the time since its beginning; `count` and `ident` read subindex 0 and a slot within a
-/// limit. The first read that fails is the last one.
+/// Reads the list. `elapsed` is the time since the reads began; `count` and `ident` read subindex 0 and the ident of a
+/// slot within a limit. After the first read that fails no further slot is read.
 pub fn detected(
     elapsed: impl Fn() -> Duration,
     count: impl FnOnce(Duration) -> Result<u8, Failed>,
@@ -134,7 +134,7 @@ mod tests {
     /// The list of a device whose answers take this time.
     fn read(count: Result<u8, Failed>, answer: Duration) -> (Detected, Duration) {
         let time = Cell::new(Duration::ZERO);
-        // As a mailbox does: at its limit a read ends without an answer.
+        // As with a mailbox: at its limit a read ends without an answer.
         let wait = |limit: Duration| {
             time.set(time.get() + answer.min(limit));
             if answer < limit { Ok(()) } else { Err(Failed::Otherwise("no answer".to_owned())) }
@@ -146,7 +146,7 @@ mod tests {
 
     // covers: ES-69
     #[test]
-    fn the_reads_of_a_list_of_modules_have_one_limit_and_what_is_left_is_named() {
+    fn the_reads_of_a_module_list_have_one_limit_and_unread_slots_are_reported() {
         let (all, _) = read(Ok(255), Duration::from_millis(20));
         assert_eq!((all.whole().map(<[u32]>::len), all.unread()), (Some(255), None));
         let (some, time) = read(Ok(255), Duration::from_secs(3));

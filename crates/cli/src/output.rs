@@ -3,7 +3,7 @@
 //! A reader may close it: `ringcat demo | head` goes on to its end. A full disk is another matter: the output is
 //! incomplete, so the command has failed.
 //!
-//! Texts of files and devices, and names of files, may contain control characters that a terminal would execute: all
+//! Texts of files and devices, and names of files, may contain control characters that a terminal would interpret: all
 //! text for operators passes through [`visible`], all JSON through [`visible_json`].
 
 use std::fmt::Arguments;

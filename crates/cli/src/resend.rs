@@ -19,8 +19,8 @@ pub struct ResendArgument {
     ///
     /// Works with one cycle under way (--under-way 1) and where the cycle has time for two round trips. SubDevices that
     /// take each write of outputs for an event, or have a SyncManager with one buffer, receive them once in a cycle;
-    /// they are listed with the reason. Without the option it is what a network file says for each domain, otherwise
-    /// never.
+    /// they are listed with the reason. Without this option, the setting of each domain in the network file is used;
+    /// without a network file, never.
     #[arg(long, value_name = "WHEN", value_enum, hide_possible_values = true, help_heading = "Cycle")]
     pub resend: Option<Resend>,
 }

@@ -145,8 +145,8 @@ fn built(arguments: &BuildArguments) -> Result<Report, Failure> {
 /// Vendor and product code.
 type Product = (u32, u32);
 
-/// The description of a file, or those of a folder that describe one of these products. A file of the folder that is
-/// refused is named and left out.
+/// The descriptions of a file, or those of a folder that describe one of these products. A file of the folder that is
+/// refused is left out with a warning.
 fn descriptions(path: &Path, wanted: &[Product]) -> Result<Vec<Esi>, Failure> {
     if !path.is_dir() {
         return Ok(vec![read(path)?]);
@@ -163,7 +163,7 @@ fn descriptions(path: &Path, wanted: &[Product]) -> Result<Vec<Esi>, Failure> {
     files.iter().filter(describes).map(|file| read(&path.join(&file.path))).collect()
 }
 
-/// The product of an image, if it is one.
+/// The product of an image; `None` if the image cannot be decoded.
 fn product_of(image: &[u8]) -> Option<Product> {
     let identity = Sii::parse(image).ok()?.header().identity;
     Some((identity.vendor_id, identity.product_code))

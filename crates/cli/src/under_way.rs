@@ -11,7 +11,8 @@ pub struct UnderWayArgument {
     /// Cycles that may be under way at once
     ///
     /// For a cycle time that is shorter than the way of a frame through segment and host. Inputs are then as many
-    /// cycles old as their way takes. Without the option it is what a network file says for each domain, otherwise 1.
+    /// cycles old as their way takes. Without this option, the setting of each domain in the network file is used;
+    /// without a network file, 1.
     #[arg(long, value_name = "CYCLES", help_heading = "Cycle", value_parser = number(1..=MAX_UNDER_WAY, 2))]
     pub under_way: Option<u8>,
 }

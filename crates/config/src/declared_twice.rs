@@ -1,14 +1,15 @@
-//! Declarations with one alias, identification or data word, of which an activation can never find each: a file with
-//! them is refused when it is read.
+//! Declarations with the same alias, identification or data word, which an activation can never find all: a file with
+//! such declarations is refused when it is read.
 //!
-//! Optional SubDevices and groups may take turns at a place: they are accepted where no SubDevice can be both.
+//! Optional SubDevices and groups may take turns at a place: they are accepted if no SubDevice can match both
+//! declarations.
 
 use std::collections::HashMap;
 
 use ringcat_engine::config::{ConfigAddress, Expected, SubDeviceConfig};
 use ringcat_engine::main_device::Required;
 
-/// Declarations of one place that are compared with each further one.
+/// Maximum number of declarations of one place with which a further one is compared.
 const MAX_COMPARED: usize = 16;
 
 /// The first declaration that is at the place of an earlier one: the earlier and the later index.
@@ -27,7 +28,7 @@ pub(crate) fn declared_twice(configs: &[SubDeviceConfig], required: Required) ->
     None
 }
 
-/// Whether two declarations of one place have different SubDevices, one of which may be absent.
+/// Whether two declarations of one place exclude each other, and one of them may be absent.
 fn take_turns(a: &SubDeviceConfig, b: &SubDeviceConfig, required: Required) -> bool {
     let one_may_be_absent = match required {
         Required::All => false,

@@ -1,4 +1,4 @@
-//! An object of PDOs in a dictionary, an assignment or a mapping (protocol 6.3), as downloads leave it.
+//! A PDO assignment or PDO mapping object of a dictionary (protocol 6.3), with its content after downloads.
 
 use std::collections::BTreeMap;
 
@@ -40,7 +40,7 @@ impl PdoList {
         self
     }
 
-    /// The entries that count; `None` if one of them, or their number, is not known.
+    /// The entries up to the count at subindex 0; `None` if one of them, or the count, is not known.
     pub(crate) fn values(&self) -> Option<Vec<u32>> {
         (1..=self.count?).map(|sub| self.entries.get(&sub).copied()).collect()
     }

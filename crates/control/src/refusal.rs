@@ -66,7 +66,7 @@ pub enum Refusal {
         /// So many.
         limit: usize,
     },
-    /// The owner of the master has as many queries as it may have.
+    /// The owner of the master has the maximum number of pending queries, or of bytes in them.
     TooManyQueries {
         /// Number of the master.
         master: u32,
@@ -125,7 +125,7 @@ impl fmt::Display for Refusal {
             Refusal::Unexpected { expected } => write!(f, "expected {expected}"),
             Refusal::TooManyClients { limit } => write!(f, "ringcatd has {limit} clients, which is the most it serves"),
             Refusal::TooManyQueries { master, owner } => {
-                write!(f, "master {master}: {owner} drives it and has as many queries, or bytes, as it may have")
+                write!(f, "master {master}: {owner} drives it and has the maximum number of pending queries or bytes")
             }
             Refusal::Service { text, .. } => f.write_str(text),
         }

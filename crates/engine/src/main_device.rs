@@ -149,7 +149,7 @@ pub struct MainDevice {
     stopped: StopSlot,
     segment: SharedSegment,
     cyclic_events: Option<Consumer>,
-    /// Cyclic events that were lost in their queue and have numbers.
+    /// Number of cyclic events that did not fit into their queue and have got numbers.
     cyclic_events_lost: u64,
     requests: Requests,
     /// Emergencies of all SubDevices.
@@ -288,14 +288,14 @@ impl MainDevice {
         self.supervisor.events_dropped() + in_queue.saturating_sub(self.cyclic_events_lost)
     }
 
-    /// The events of both halves from a number on, also those that were fetched: for a client that was away. 4,096
-    /// events are kept: the last ones, but of the cyclic half no more than the last 1,024 in the place of others.
+    /// The events of both halves from a number on, also those that were fetched: for a client that was disconnected.
+    /// The last 4,096 events are kept; events of the cyclic half beyond the last 1,024 are dropped before others.
     pub fn events_since(&mut self, number: u64) -> EventsSince {
         self.number_cyclic_events(self.supervisor.bus().now());
         self.supervisor.events_since(number)
     }
 
-    /// Takes the events of the cyclic half into the log. Those that its queue had no room for are numbered as well.
+    /// Moves the events of the cyclic half into the log. Events that did not fit into its queue get numbers as well.
     fn number_cyclic_events(&mut self, now: Instant) {
         let Some(cyclic) = self.cyclic_events.as_mut() else { return };
         self.supervisor.with_events(|log| {
@@ -307,7 +307,7 @@ impl MainDevice {
                 let event = event.event();
                 log.push_cyclic(now, event);
             }
-            // They were raised after those that had filled the queue.
+            // They occurred after the events that had filled the queue.
             let lost = cyclic.dropped();
             log.skip(lost.saturating_sub(self.cyclic_events_lost));
             self.cyclic_events_lost = lost;
@@ -324,7 +324,7 @@ impl MainDevice {
         self.segment.view().clocks().status()
     }
 
-    /// Whether all clocks are locked that operation needs ([`ClockStatus::is_required`], protocol 7.2).
+    /// Whether all required clocks are locked ([`ClockStatus::is_required`], protocol 7.2).
     pub fn clocks_locked(&self) -> bool {
         self.segment.view().clocks().are_locked()
     }

@@ -83,7 +83,7 @@ impl<'a> Session<'a> {
         self.write_text(&fmt::format(text))
     }
 
-    /// Writes a value of a SubDevice: its bytes to a program, text to a terminal, which shows no zero bytes.
+    /// Writes a value of a SubDevice: its bytes to a program, text without zero bytes to a terminal.
     ///
     /// # Errors
     /// The output is closed.
@@ -305,7 +305,7 @@ mod tests {
 
     // covers: daemon
     #[test]
-    fn text_of_devices_does_not_reach_the_terminal_as_it_is() {
+    fn control_characters_in_text_of_devices_are_escaped() {
         let (mut output, mut errors) = (Vec::new(), Vec::new());
         let arguments = Arguments::parse(&[]).expect("no words");
         let mut session = Session::new("slaves", arguments, Path::new("/"), &mut output, &mut errors);

@@ -77,8 +77,8 @@ pub struct Active {
     pub application: App,
     /// The last call of send that distributed time.
     sent_at: Instant,
-    /// The one before: what is read from its frame is not old, whether or not the domain was processed since the last
-    /// call of receive.
+    /// The previous one: a time that is read from its frame is valid, whether or not the domain was processed since the
+    /// last call of receive.
     awaited: Instant,
     /// The next call of send distributes time.
     distributes: bool,

@@ -83,8 +83,8 @@ impl Draft {
         self.declaration.found(&self.found, SubDeviceId(index))
     }
 
-    /// Declares the network of a network file or an ENI. What it leaves to the EEPROM is that of the SubDevices that
-    /// were found.
+    /// Declares the network of a network file or an ENI. Process data and mailboxes that it leaves to the EEPROM are
+    /// those of the SubDevices that were found.
     ///
     /// # Errors
     /// SubDevices or domains are declared already; process data of the file does not fit.

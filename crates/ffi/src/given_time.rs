@@ -1,17 +1,17 @@
-//! Times of the application that it has set before its activation.
+//! Application times that were set before the activation.
 
 use std::time::Instant;
 
 /// A time, and when it was set.
 type At = (u64, Instant);
 
-/// Times before activation. The first one begins the grid of SYNC pulses; the application's time goes on from the last
-/// one.
+/// Application times before the activation. The grid of SYNC pulses begins with the first one; the application time
+/// continues from the last one.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Given {
-    /// The first one that is not 0.
+    /// The first time that is not 0.
     pub first: Option<At>,
-    /// The last one; `None` if that is 0.
+    /// The last time; `None` if that is 0.
     pub last: Option<At>,
 }
 
@@ -23,7 +23,7 @@ impl Given {
     }
 }
 
-/// Nanoseconds since then.
+/// Nanoseconds since an instant.
 pub fn passed_since(at: Instant) -> u64 {
     u64::try_from(at.elapsed().as_nanos()).unwrap_or(u64::MAX)
 }
@@ -34,7 +34,7 @@ mod tests {
 
     // covers: dc-sync, c-interface
     #[test]
-    fn the_first_time_begins_the_grid_and_the_last_one_goes_on() {
+    fn the_grid_begins_with_the_first_time_and_the_time_continues_from_the_last() {
         let mut given = Given::default();
         given.set(0);
         assert!(given.first.is_none() && given.last.is_none());

@@ -213,7 +213,7 @@ impl Master {
         if self.is_active() {
             return Err(Code::BUSY);
         }
-        // By these words the bus tells which SubDevice is which.
+        // SubDevices are identified by these words.
         let words = self.bus()?.supervisor().learn_data_words(file.declared());
         words.map_err(|_| Code::GONE)?;
         self.refresh()?;
@@ -333,7 +333,7 @@ impl Master {
         let bus = self.bus()?;
         let taken = self.application.use_within(CLAIM_LIMIT, Slot::take)?;
         let Active { mut application, .. } = taken.ok_or(Code::INVALID)?;
-        // Nothing reaches the SubDevices of a bus that the daemon has taken back, which is in the log.
+        // No frame reaches the SubDevices of a bus that the daemon has taken back; the log already has this.
         let is_held = bus.check_held().is_ok();
         let limit = if is_held { END_LIMIT } else { Duration::ZERO };
         let mut draft = locked(&self.draft);

@@ -16,10 +16,10 @@ use crate::settings::Name;
 
 /// The name of an ENI without a file, for messages.
 const ENI_IN_MEMORY: &str = "ENI in memory";
-/// Notices of a file that are reported one by one.
+/// Maximum number of notices of a file that are reported one by one.
 const MAX_NOTICES: usize = 20;
 
-/// Names of a loaded network. Of several with one name it is the first in the file.
+/// Names of a loaded network. A name that occurs several times means the first one in the file.
 #[derive(Debug, Default)]
 pub struct Names {
     /// SubDevices, by their index in the declaration.
@@ -190,7 +190,7 @@ pub fn names(configuration: &Configuration, domains: &[String], areas: &[Area]) 
     let subdevices = configuration.subdevices.iter().enumerate();
     let domains = domains.iter().enumerate();
     let variables = configuration.image.variables.iter();
-    // The first of several with one name is the last that is put in.
+    // Inserted last to first, so that of several with one name the first one remains.
     Names {
         subdevices: subdevices.rev().map(|(index, facts)| (facts.name.clone(), index)).collect(),
         domains: domains.map(|(number, name)| (name.clone(), DomainId(number))).collect(),

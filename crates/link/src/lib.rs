@@ -13,7 +13,7 @@
 //! * [`tap`]: TAP interfaces, network interfaces whose other end is this process;
 //! * [`monotonic`], [`realtime`]: the host's clock, scheduling, memory locking, processor latency;
 //! * [`operator`]: lines on the standard error and in the journal, without waiting;
-//! * [`visible`]: text for a terminal, with characters that are not shown as escape sequences;
+//! * [`visible`]: text for a terminal, with hidden characters as escape sequences;
 //! * [`signals`]: signals that request the end of a program;
 //! * [`pcapng`]: captures for Wireshark; [`recorder`]: writing captures during operation; [`sniffer`]: capturing an
 //!   interface passively.

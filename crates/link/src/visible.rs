@@ -1,12 +1,12 @@
 //! Text of devices, files and other programs, as a terminal may show it.
 //!
-//! A name in an EEPROM or a file can contain characters that a terminal obeys, or that change the direction or the
-//! lines of what it shows. Programs pass all text for operators through [`visible`], and lines of JSON through
-//! [`visible_json`]. The one list of such characters is [`is_hidden`].
+//! A name in an EEPROM or a file can contain characters that a terminal interprets as commands, or that change the
+//! direction or the lines of a text (bidirectional formatting, line separators). Programs pass all text for operators
+//! through [`visible`], and lines of JSON through [`visible_json`]. The one list of such characters is [`is_hidden`].
 
 use std::fmt::Write;
 
-/// Formats and separators: first and last.
+/// Format characters and separators: first and last of each range.
 const HIDDEN: [(char, char); 13] = [
     ('\u{AD}', '\u{AD}'),
     ('\u{61C}', '\u{61C}'),
@@ -20,13 +20,13 @@ const HIDDEN: [(char, char); 13] = [
     ('\u{1BCA0}', '\u{1BCA3}'),
     ('\u{1D173}', '\u{1D17A}'),
     ('\u{E0000}', '\u{E00FF}'),
-    // Selectors of variants (U+E0100 to U+E01EF) belong to the character before them.
+    // Variation selectors (U+E0100 to U+E01EF) belong to the character before them.
     ('\u{E01F0}', '\u{E0FFF}'),
 ];
 
-/// Whether a character has no picture of its own, but changes the state of a terminal, or the direction or the lines of
-/// a text: controls, line and paragraph separators, formats (Unicode Cc, Zl, Zp, Cf). Line feeds and tabs do not count,
-/// nor do marks of Arabic and Syriac numbers, which are shown.
+/// Whether a character has no glyph of its own, but changes the state of a terminal, or the direction or the lines of a
+/// text: control characters, line and paragraph separators, format characters (Unicode categories Cc, Zl, Zp, Cf). Not
+/// hidden are line feeds and tabs, nor Arabic number signs and the Syriac abbreviation mark, which are visible.
 #[inline(never)]
 pub fn is_hidden(c: char) -> bool {
     if c < '\u{AD}' {
@@ -72,7 +72,7 @@ mod tests {
 
     // covers: verdict
     #[test]
-    fn control_characters_of_files_and_devices_are_shown_and_not_obeyed() {
+    fn control_characters_of_files_and_devices_are_escaped() {
         for text in ["", "plain", "two\nlines\tand a column", "Ger\u{e4}t \u{4e2d}\u{3000}e\u{301} \u{1F600}"] {
             assert_eq!((visible(text), visible_json(text)), (text.to_owned(), text.to_owned()));
         }
@@ -82,7 +82,7 @@ mod tests {
 
     // covers: verdict
     #[test]
-    fn separators_and_formats_are_shown_in_text_and_in_json() {
+    fn separators_and_format_characters_are_escaped_in_text_and_in_json() {
         let hidden = "\u{ad}\u{61c}\u{180e}\u{200b}\u{200d}\u{200e}\u{200f}\u{2028}\u{2029}\u{202a}\u{2060}\u{206f}\
                       \u{feff}\u{fff9}\u{1d173}\u{e0001}\u{e007f}";
         for c in hidden.chars() {

@@ -37,8 +37,8 @@ pub trait AcyclicHalf {
     #[cfg(feature = "standby")]
     fn report_watchdogs_within(&mut self, gap: Duration, cycle: Duration, now: Instant);
 
-    /// The SubDevices whose watchdog is not longer than process data may be missing, with their watchdogs and that
-    /// time. Not for the cyclic path.
+    /// The SubDevices whose watchdog is not longer than the time for which process data may be missing, with both
+    /// times. Not for the cyclic path.
     ///
     /// # Errors
     /// Its thread has ended.

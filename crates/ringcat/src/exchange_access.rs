@@ -29,8 +29,8 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         self.cyclic.exchange.set_application_time(time_ns, now);
     }
 
-    /// The first time of the application, in nanoseconds, that it had at an earlier moment, such as before this
-    /// application began: the grid of SYNC pulses begins with it (`PulseGrid`). To be called before
+    /// Sets the first application time, in nanoseconds, which was valid at the earlier instant `at`, for example before
+    /// this application began: the grid of SYNC pulses begins with this time (`PulseGrid`). To be called before
     /// [`Application::set_application_time`].
     pub fn set_first_application_time(&mut self, time_ns: u64, at: Instant) {
         self.cyclic.exchange.set_first_application_time(time_ns, at);

@@ -69,8 +69,8 @@ impl<L: Links> MainDevice<L> {
     }
 
     /// Reads the words of memory by which declarations find SubDevices
-    /// ([`ConfigAddress::DataWord`](crate::ConfigAddress)) into the result of a scan. An activation reads them by
-    /// itself; a comparison before it needs them.
+    /// ([`ConfigAddress::DataWord`](crate::ConfigAddress)) into the result of a scan. An activation reads these words
+    /// itself; a comparison before the activation needs this function.
     pub fn read_data_words(&mut self, declared: &[SubDeviceConfig], scan: &mut Scan) {
         let words = self.engine.start_data_words(data_words(declared));
         let read = self.finish(words);
@@ -317,7 +317,7 @@ pub fn automatic(subdevices: &[SubDeviceInfo], period: Duration) -> Declaration 
     declaration
 }
 
-/// Takes the data words that were read into the result of a scan; those of another scan belong to other SubDevices.
+/// Copies the data words that were read to the result of a scan; words that belong to another scan are skipped.
 pub(crate) fn take_data_words(read: Vec<SubDeviceInfo>, scan: &mut Scan) {
     for (of, read) in scan.subdevices.iter_mut().zip(read) {
         if (of.station, of.identity) == (read.station, read.identity) {

@@ -236,7 +236,8 @@ impl SupervisorThread {
         self.finish_scan(|| ())
     }
 
-    /// Reads the data words by which declared SubDevices are found; [`SupervisorThread::subdevices`] has them then.
+    /// Reads the data words by which declared SubDevices are found; after that [`SupervisorThread::subdevices`] has
+    /// them.
     ///
     /// # Errors
     /// [`Error::Gone`]: the thread has ended.
@@ -330,7 +331,7 @@ impl SupervisorThread {
         }
     }
 
-    /// Reads the data words by which loaded SubDevices are declared.
+    /// Reads the data words by which the loaded declaration finds SubDevices.
     fn read_loaded_data_words(&self) -> Result<(), Error> {
         Ok(self.start_work(|engine| engine.start_loaded_data_words()).wait()??)
     }

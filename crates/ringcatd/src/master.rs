@@ -182,7 +182,7 @@ impl Master {
         self.others.listen();
     }
 
-    /// Answers a question, from the process that drives it.
+    /// Answers a query, from the process that drives the master.
     pub fn ask(&self, what: Query, bytes: Vec<u8>) -> Answered {
         let level = match what {
             Query::Tool(ToolQuery::SetDebugLevel { level }) => Some(level),
@@ -192,7 +192,7 @@ impl Master {
         if let Ok((Answer::Tool(ToolAnswer::Master(report)), _)) = &mut answered {
             report.is_orphaned = self.opened().is_none_or(|opened| opened.is_without_device());
         }
-        // Where nothing drives, it counts as soon as something does.
+        // If no process drives the master, the level takes effect as soon as one does.
         if let Some(level) = level.filter(|_| matches!(answered, Ok(_) | Err(Refusal::Fault { .. }))) {
             self.debug_level.store(level, Ordering::Release);
         }
@@ -201,7 +201,7 @@ impl Master {
 
     fn ask_driver(&self, what: Query, bytes: Vec<u8>) -> Answered {
         let master = self.number;
-        // A level sends nothing: another MainDevice on the segment is no reason against it.
+        // Setting the level sends no frame: it is permitted with another MainDevice on the segment.
         let sends = !matches!(what, Query::Tool(ToolQuery::SetDebugLevel { .. }));
         let supervisor = match &*self.driver.lock() {
             Driver::Daemon(driving, opened) => match self.others.cause().filter(|_| sends) {

@@ -1,7 +1,8 @@
 //! An application that drives a master, on the side of the daemon: queries to it, and their answers.
 //!
-//! What an owner has not answered yet is bounded in number and in bytes, so a message to it always finds room in the
-//! socket, and an owner that is stopped costs each client one second at most. Further queries wait for a place.
+//! The queries that an owner has not answered yet are bounded in number and in bytes, so a message to the owner always
+//! fits into the socket, and a stopped owner delays each client by one second at most. Further queries wait for a
+//! place.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -16,11 +17,11 @@ use ringcat_link::process::wait_readable;
 
 /// An owner takes a query within this time.
 pub const SILENCE: Duration = Duration::from_secs(1);
-/// Queries that it may have at a time.
+/// Maximum number of pending queries.
 const MAX_PENDING: usize = 16;
-/// Those of them that only read: the others always find a place.
+/// Maximum number of pending queries that only read: so there is always a place for the others.
 const MAX_READING: usize = 12;
-/// Bytes of queries that it may have at a time: half of what a socket holds by default.
+/// Maximum number of bytes in pending queries: half of the default size of a socket buffer.
 const MAX_BYTES: usize = 96 << 10;
 
 /// An answer with its data.
@@ -244,7 +245,7 @@ mod tests {
 
     // covers: daemon
     #[test]
-    fn a_silent_owner_is_named_after_a_second_and_holds_a_bounded_number_of_queries() {
+    fn a_silent_owner_is_reported_after_a_second_and_its_queries_are_bounded() {
         let (owner, _far) = for_tests().expect("a pair");
         let owner = Arc::new(owner);
         let begin = Instant::now();
@@ -268,7 +269,7 @@ mod tests {
 
     // covers: daemon
     #[test]
-    fn answers_reach_their_queries_in_any_order_and_late_ones_nothing() {
+    fn answers_reach_their_queries_in_any_order_and_late_ones_are_dropped() {
         let (owner, far) = for_tests().expect("a pair");
         let owner = Arc::new(owner);
         let asking = owner.clone();

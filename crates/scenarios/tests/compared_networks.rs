@@ -1,6 +1,6 @@
-//! Networks of files on buses that were changed at random, with SYNC signals, modules in slots, and process data that
-//! is left to the EEPROM or assigned by start-up commands: `compare` marks a difference that prevents OP exactly if the
-//! network does not reach OP there, by the network file and by its ENI.
+//! Networks of files are compared with buses that were changed at random: with SYNC signals, with modules in slots, and
+//! with process data that is left to the EEPROM or assigned by start-up commands. `compare` marks a difference that
+//! prevents OP exactly if the network does not reach OP there, by the network file and by its ENI.
 
 use std::path::Path;
 use std::time::Duration;

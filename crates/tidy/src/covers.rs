@@ -118,7 +118,7 @@ pub fn unresolved_covers(tree: &Tree, features: &BTreeSet<String>) -> Vec<Findin
     findings
 }
 
-/// Beginning of the statements each of which a test covers: what is claimed of descriptions of devices and networks.
+/// Prefix of the statements that each need a test: statements about descriptions of devices and networks.
 const COVERED: &str = "ES-";
 
 /// Claimed statements that no test covers.

@@ -74,7 +74,8 @@ pub struct Address {
     pub alias: Option<u16>,
     /// Identification value (hot connect); null where it is found otherwise
     pub identification: Option<u16>,
-    /// Address of the word of its memory that holds the identification; null where the EEPROM says how it is read
+    /// Address of the word in the memory of the SubDevice that holds the identification; null where the EEPROM states
+    /// how it is read
     pub data_word: Option<u16>,
     /// Positions behind the one with the alias or the identification; null with `position`
     pub offset: Option<u16>,

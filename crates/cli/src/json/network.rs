@@ -45,8 +45,8 @@ pub struct Compare {
 #[derive(Clone, Debug, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Difference {
-    /// missing, additional, order, device, revision, serial, identification, pdos, mailbox, protocols, sync manager,
-    /// ports, process data, firmware, cable, modules, clocks or ring
+    /// missing, additional, order, ambiguous, device, revision, serial, identification, pdos, mailbox, protocols, sync
+    /// manager, ports, process data, firmware, cable, modules, clocks or ring
     pub kind: String,
     /// Index of the SubDevice in the file, from 0; null for a SubDevice that is not in the file, and for a ring
     pub subdevice: Option<usize>,

@@ -209,8 +209,8 @@ impl ConfiguredNetwork {
         })
     }
 
-    /// Whether the data words were read by which the file finds SubDevices. A MainDevice that joins a ring declares
-    /// before; its activation reads them, and compares.
+    /// Whether the data words by which the file finds SubDevices were read. A MainDevice that joins a ring declares
+    /// before they are read; its activation reads and compares them.
     fn has_words_of(&self, found: &[SubDeviceInfo]) -> bool {
         let words = ringcat::data_words(&self.configuration().declaration.subdevices);
         words.into_iter().all(|word| found.iter().any(|info| info.data_word(word).is_some()))

@@ -1,4 +1,4 @@
-//! `ringcat compare` by SubDevice and not by type; terminals with several samples.
+//! `ringcat compare` compares modules by SubDevice and not by type; terminals with several samples (oversampling).
 
 use std::fs;
 use std::path::Path;
@@ -36,7 +36,7 @@ fn declared(place: &Place, (esi, kind): (&str, &str), mode: &str) -> (String, St
     (out, place.write("bus.toml", &bus))
 }
 
-/// Operation modes choose PDOs, and copies of a sample.
+/// Operation modes choose PDOs and the number of samples.
 // covers: network-file, ES-47
 #[test]
 fn pdos_and_samples_of_an_operation_mode_are_no_differences() {
@@ -79,7 +79,7 @@ fn pdos_and_samples_of_an_operation_mode_are_no_differences() {
     }
 }
 
-/// Two of one type: the file has the modules of one of them.
+/// Two SubDevices of one type: the file has the modules of only one of them.
 // covers: network-file, ES-69
 #[test]
 fn modules_are_those_of_a_subdevice_and_not_of_its_type() {

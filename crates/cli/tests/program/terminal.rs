@@ -1,4 +1,4 @@
-//! Control characters in files and in their names, which a terminal would execute instead of showing them.
+//! Control characters in files and in their names, which a terminal would interpret instead of showing them.
 
 use crate::files::{Place, Said, ringcat};
 

@@ -12,7 +12,7 @@ use crate::configuration::Configuration;
 
 /// Maximum number of compared pairs between the common begin and end; beyond it SubDevices are compared by position.
 const MAX_PAIRS: usize = 1 << 24;
-/// Maximum number of SubDevices with one mark that are tried for a declaration.
+/// Maximum number of SubDevices with one identifier that are tried for a declaration.
 const MAX_TWINS: usize = 64;
 
 /// The counterpart of a SubDevice.
@@ -216,8 +216,8 @@ pub(super) fn position(config: &SubDeviceConfig) -> usize {
     }
 }
 
-/// SubDevices that are declared by alias, identification or data word. Of several with one mark, none of which the
-/// activation takes, it is the first that is the declared device.
+/// SubDevices that are declared by alias, identification or data word. If several have one identifier, the activation
+/// uses none of them; then it is the first one that is the declared device.
 fn by_mark(
     configs: &[SubDeviceConfig],
     (found, stated): (&[SubDeviceInfo], &[Stated]),
@@ -239,8 +239,8 @@ fn by_mark(
     }
 }
 
-/// The pairs of an activation that refuses no declaration, in a file with optional SubDevices: which of two alike ones
-/// is absent is decided there. None if it would take another device than the file states.
+/// The pairs of an activation that refuses no declaration, in a file with optional SubDevices: the engine decides which
+/// of two SubDevices of one type is absent. Empty if the engine would take another device than the file states.
 fn activated(configs: &[SubDeviceConfig], found: &[SubDeviceInfo], stated: &[Stated]) -> Vec<(usize, usize)> {
     if configs.iter().all(|config| !config.optional) {
         return Vec::new();
@@ -280,7 +280,8 @@ fn common(configs: &[usize], infos: &[usize], alike: &Alike<'_>) -> Vec<(usize, 
 }
 
 /// The sequence with the most pairs that have all that the file demands, then with the most pairs of the same device;
-/// of several, the one with the fewest mandatory declarations left, then that in which each is at its own place.
+/// of several, the one that leaves the fewest mandatory declarations without a SubDevice, then the one in which each
+/// SubDevice is at its own place.
 fn best(configs: &[usize], infos: &[usize], degree: &impl Fn(usize, usize) -> u32) -> Vec<(usize, usize)> {
     let width = infos.len() + 1;
     let mut sums = vec![0u32; (configs.len() + 1) * width];

@@ -12,8 +12,8 @@ use super::difference::Stated;
 const OWN: u32 = 1 << 14;
 /// Degree of a SubDevice of the same vendor and product that the file refuses, for example for its serial number.
 const SAME_DEVICE: u32 = 2;
-/// What a declaration counts more that is not optional, in a file with optional ones: of two alike SubDevices the
-/// optional one is absent.
+/// What is added to the degree of a mandatory declaration in a file with optional ones: of two SubDevices of one type
+/// the optional one is absent.
 const MANDATORY: u32 = 1;
 
 /// Vendor, product, serial number.

@@ -1,7 +1,7 @@
 //! The PDOs that a SubDevice assigns to its SyncManagers by its SII, compared with those that a file assigns.
 //!
-//! The MainDevice writes the assignment where it can (protocol 5.2). A network file that says nothing leaves it to the
-//! SubDevice: that is no difference. Process data that an ENI does not have is not set up.
+//! The MainDevice writes the assignment where it can (protocol 5.2). A network file without PDOs leaves the assignment
+//! to the SubDevice: then no PDO is a difference. Process data that an ENI does not have is not set up.
 
 use std::collections::BTreeMap;
 

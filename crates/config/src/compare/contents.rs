@@ -118,8 +118,8 @@ impl Both<'_> {
         let mut unfit = process_data::unfit(declared, info);
         let mut assigned = Vec::new();
         if is_modular {
-            // Its SII describes none of its modules: only what an ENI does not have at all. A SyncManager that is
-            // declared as disabled has no modules of its direction.
+            // The SII describes none of the modules: only process data that is missing in an ENI is compared. A
+            // SyncManager that is declared as disabled has no modules of its direction.
             let has = |number: u8| declared.declared.iter().flatten().any(|it| it.index == number);
             unfit.retain(|number, lengths| lengths.is_left_out() && !has(*number));
         } else {

@@ -1,6 +1,6 @@
-//! Whether the process data of a SubDevice can be brought to what a file declares. PDOs are written where the
-//! SubDevice has CoE and its SII permits it (protocol 4.2, 6.3); otherwise it keeps its own, and refuses SAFEOP if the
-//! length of a SyncManager is another one. A controller without a processor (device emulation) takes any.
+//! Whether the process data of a SubDevice can be brought to what a file declares. PDOs are written where the SubDevice
+//! has CoE and its SII permits it (protocol 4.2, 6.3); otherwise it keeps its own, and refuses SAFEOP if the length of
+//! a SyncManager is another one. A controller without a processor (device emulation) accepts any length.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -19,11 +19,11 @@ use super::written::Written;
 pub(super) struct Lengths {
     /// As declared.
     pub(super) declared: u16,
-    /// The one that the SubDevice has.
+    /// The length that the SubDevice has.
     pub(super) own: u16,
-    /// Why.
+    /// Why they differ.
     reason: Reason,
-    /// Whether start-up commands of the file leave them.
+    /// Whether the length of the SubDevice is due to start-up commands of the file.
     pub(super) is_written: bool,
 }
 
@@ -60,7 +60,7 @@ impl fmt::Display for Lengths {
     }
 }
 
-/// The SyncManagers whose length stays another one than declared.
+/// The SyncManagers whose length remains different from the declared one.
 pub(super) fn unfit(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> BTreeMap<u8, Lengths> {
     if info.device_emulation || !matches!(declared.target, AlState::SafeOp | AlState::Op) {
         return BTreeMap::new();
@@ -87,7 +87,7 @@ pub(super) fn unfit(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> BTreeMa
     let mut unfit = BTreeMap::new();
     for number in compared {
         let area = wanted.process_data.iter().find(|area| area.sync_manager == number);
-        // The SII does not contain the lengths of operation modes; none has no process data.
+        // The SII does not contain the lengths of operation modes, but each mode has process data.
         if samples::are_chosen(number, info) && area.is_some_and(|area| area.length > 0) {
             continue;
         }

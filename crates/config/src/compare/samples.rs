@@ -10,8 +10,8 @@ pub(super) fn are_chosen(sync_manager: u8, info: &SubDeviceInfo) -> bool {
     of(sync_manager, info).next().is_some()
 }
 
-/// Whether a PDO that the SII does not list for the SyncManager is a further sample: as long as one that it lists. The
-/// indices of many samples reach into those of another SyncManager.
+/// Whether a PDO that the SII does not list for the SyncManager is a further sample: one of the same length as a listed
+/// PDO. With many samples, the indices overlap with those of another SyncManager.
 pub(super) fn is_sample(pdo: &PdoMapping, sync_manager: u8, info: &SubDeviceInfo) -> bool {
     let Some(entries) = &pdo.entries else { return false };
     let length: u32 = entries.iter().map(|entry| u32::from(entry.bit_length)).sum();

@@ -7,13 +7,13 @@ use ringcat_wire::al::AlState;
 
 /// The bits of AssignActivate that are register 0x0981: unit, SYNC0, SYNC1.
 const ACTIVATION: u16 = 0x0700;
-/// Those of the two signals: the unit alone is for latch units, and needs no cycle.
+/// The bits of the two signals: with the bit of the unit alone only latch units are active, which need no cycle.
 const SIGNALS: u16 = 0x0600;
 /// Most operation modes that a message lists.
 const LISTED: usize = 8;
 
-/// The differences, and whether each prevents OP; none if the SII has no operation modes, or is not read as far as
-/// them. An SII whose modes have no signals at all may lack those of the description.
+/// The differences, and whether each prevents OP; none if the SII has no operation modes, or if they were not read. If
+/// none of the modes in the SII has signals, the ESI may have further modes: then the difference does not prevent OP.
 pub(super) fn differences(declared: &SubDeviceConfig, info: &SubDeviceInfo) -> Vec<(bool, String)> {
     let Some(sync) = declared.sync.filter(|sync| sync.assign_activate & ACTIVATION != 0) else { return Vec::new() };
     let is_checked = info.controller.features.dc && !info.device_emulation && !info.dc_modes.is_empty();

@@ -1,4 +1,4 @@
-//! Several SubDevices with the alias, identification or data word of a declaration: the activation takes none of them.
+//! Several SubDevices with the alias, identification or data word of a declaration: the activation uses none of them.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,8 @@ use super::difference::{Difference, DifferenceKind};
 use super::marks::Marks;
 use crate::configuration::Configuration;
 
-/// One difference for each mark that several SubDevices have, with the first declaration that counts from it.
+/// One difference for each identifier that several SubDevices have, with the first declaration that uses it. `marks`
+/// decides which differences prevent OP.
 pub(super) fn differences(
     configuration: &Configuration,
     found: &[SubDeviceInfo],

@@ -1,4 +1,4 @@
-//! Which declared SubDevice a found one is, and what of it no SII lists: PDOs of modules in slots.
+//! The declaration of a found SubDevice, and its PDOs that the SII does not list: those of modules in slots.
 
 use std::collections::BTreeSet;
 

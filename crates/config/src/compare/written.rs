@@ -1,6 +1,6 @@
 //! Assignment and mapping of PDOs that a SubDevice with CoE has when SAFEOP is requested (protocol 6.3): as start-up
-//! commands and the tables of a network file leave them. What is not written is as in the SII, and so is what a
-//! SubDevice does not permit to write.
+//! commands and the tables of a network file leave them. Objects that are not written, or that the SubDevice does not
+//! permit to write, are as in the SII.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -37,7 +37,7 @@ fn download(command: &StartupCommand) -> Option<&SdoDownload> {
 pub(super) struct Written<'a> {
     info: &'a SubDeviceInfo,
     objects: BTreeMap<u16, PdoList>,
-    /// Those that a start-up command wrote last.
+    /// Objects that a start-up command wrote last.
     by_commands: BTreeSet<u16>,
     /// Whether a write is not permitted.
     is_refused: bool,

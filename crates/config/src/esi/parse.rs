@@ -132,7 +132,7 @@ fn group(element: Element<'_>) -> Result<Group, EsiError> {
     })
 }
 
-/// Notes a second group of a key, and keys without a group, each once (protocol ES-15).
+/// Adds a notice for a second group with the same key, and for each key without a group, once (protocol ES-15).
 fn note_groups(descriptions: Element<'_>, groups: &[Group], devices: &[Device]) {
     let mut lines: HashMap<&str, u32> = HashMap::new();
     for group in groups {
@@ -146,7 +146,7 @@ fn note_groups(descriptions: Element<'_>, groups: &[Group], devices: &[Device]) 
     for device in devices {
         let key = device.group.trim();
         if !key.is_empty() && !lines.contains_key(key) {
-            descriptions.note_at(device.line, format!("GroupType {} names no group", shown(key)));
+            descriptions.note_at(device.line, format!("GroupType {}: there is no such group", shown(key)));
             lines.insert(key, device.line);
         }
     }

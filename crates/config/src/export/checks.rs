@@ -64,12 +64,12 @@ fn problem(config: &SubDeviceConfig) -> Option<(&'static str, String, String)> {
     odd.map(|reason| ("time limit", String::new(), reason))
 }
 
-/// Why an ENI cannot have this limit.
+/// Why an ENI cannot express this limit; `None` if it can.
 pub(crate) fn odd_limit(limit: Duration) -> Option<String> {
     (!is_in_ms(limit)).then(|| format!("{limit:?}: a time limit of an ENI is a number of milliseconds"))
 }
 
-/// Whether an ENI can have this limit.
+/// Whether an ENI can express this limit.
 pub(super) fn is_in_ms(limit: Duration) -> bool {
     let ms = limit.as_millis();
     limit.as_nanos().is_multiple_of(1_000_000) && (1..=u128::from(u32::MAX)).contains(&ms)

@@ -29,7 +29,7 @@ pub(super) enum Mark {
     Alias(u16),
     /// The identification in AL status code (protocol 5.3).
     Identification(u16),
-    /// The identification in a word of its memory (protocol 4.3).
+    /// The identification in a word of the SubDevice's memory (protocol 4.3).
     DataWord {
         /// Physical address.
         register: RegisterAddress,

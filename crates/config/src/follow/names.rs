@@ -1,5 +1,5 @@
-//! Names that several SubDevices or several variables of a file have: a notice, as a program that looks for one of them
-//! gets the first.
+//! Names that several SubDevices or several variables of a file have: each gives a notice, because a program that looks
+//! for the name gets only the first one.
 
 use std::collections::HashMap;
 
@@ -9,7 +9,7 @@ use crate::eni::{Eni, Place, quoted};
 /// Names shown in a notice.
 const NAMES: usize = 3;
 
-/// Notes the names that are not unique.
+/// Adds notices for the names that are not unique.
 pub(super) fn note_duplicates(eni: &Eni, notices: &mut Notices) {
     let subdevices = eni.subdevices.iter().map(|subdevice| (subdevice.name.as_str(), subdevice.place));
     note("SubDevices", subdevices, notices);

@@ -22,7 +22,7 @@ const MAX_UNDER_WAY: u8 = ringcat_engine::main_device::MAX_UNDER_WAY;
 const LONGEST_PERIOD_S: u64 = 10;
 /// Largest amount of a shift or a cycle of SYNC signals.
 const LONGEST_SHIFT_NS: i64 = i32::MAX as i64;
-/// Addresses of memory that may hold an identification: digital inputs, user memory, process memory.
+/// Addresses of memory that may hold an identification: digital inputs, user RAM, process data RAM.
 const DATA_WORDS: std::ops::RangeInclusive<u16> = 0x0F00..=0xFFFE;
 /// Bytes of an IP host name.
 const HOST_NAME: usize = 32;

@@ -92,14 +92,14 @@ impl Notes {
         let has_frame = device.sync_units.iter().any(|unit| unit.separate_frame);
         let potential = device.clock.as_ref().is_some_and(|clock| clock.potential_reference);
         for (is_stated, notice) in [
-            (device.use_lrd_lwr, "UseLrdLwr: its EEPROM decides whether it is in an LRW"),
+            (device.use_lrd_lwr, "UseLrdLwr: the EEPROM of the device decides whether it is in an LRW"),
             (
                 aoe.is_some_and(|aoe| aoe.generate_net_id),
-                "AoE GenerateOwnNetId: no AMS net id is chosen; a start-up command may write one",
+                "AoE GenerateOwnNetId: no AMS NetId is chosen; a start-up command may write one",
             ),
             (
                 aoe.is_some_and(|aoe| aoe.initialize_net_id),
-                "AoE InitializeOwnNetId: no AMS net id is sent to it; a start-up command may write one",
+                "AoE InitializeOwnNetId: no AMS NetId is sent to it; a start-up command may write one",
             ),
             (is_separate, "Su SeparateSu: its process data shares datagrams; a `domain` of its own separates it"),
             (has_frame, "Su SeparateFrame: its process data shares frames with other SubDevices"),

@@ -110,7 +110,7 @@ fn names(found: &[SubDeviceInfo]) -> Vec<String> {
 }
 
 /// Clocks with the reference that the engine takes where none is named, the first SubDevice with a clock. An ENI made
-/// of the file names it.
+/// from the file names the same reference.
 fn clocks(found: &[SubDeviceInfo], names: &[String]) -> Clocks {
     let first = found.iter().position(|info| info.controller.features.dc);
     Clocks { reference: first.map(|index| names[index].clone()), ..Clocks::default() }

@@ -174,7 +174,8 @@ pub struct SubDevice {
     pub alias: Option<u16>,
     /// The explicit device identification from which its place counts.
     pub identification: Option<u16>,
-    /// Address of the word of its memory that holds `identification`, where its EEPROM does not say how it is read.
+    /// Address of the word in the memory of the SubDevice that holds `identification`; needed if the EEPROM does not
+    /// state how the identification is read.
     pub identification_word: Option<u16>,
     /// Number of SubDevices behind the one with the alias or identification.
     pub offset: Option<u16>,

@@ -39,7 +39,7 @@ pub(super) fn groups(file: &NetworkFile) -> Checked {
     Ok(())
 }
 
-/// Each SubDevice that is found by its position has one of its own.
+/// No two SubDevices that are found by position have the same position.
 pub(super) fn positions(file: &NetworkFile) -> Checked {
     let (mut known, mut next) = (BTreeMap::new(), 0);
     for (index, subdevice) in file.subdevice.iter().enumerate() {

@@ -24,11 +24,11 @@ const OUTPUTS: u8 = 0x24;
 const INPUTS: u8 = 0x20;
 /// Watchdog enable in the control byte.
 const WATCHDOG: u8 = 0x40;
-/// What the ENI of a SubDevice without SyncManagers means.
+/// Consequence of an ENI without SyncManagers for a SubDevice.
 const WITHOUT_PROCESS_DATA: &str = "the file has no process data of it, and an ENI leaves none to the EEPROM: a \
                                     SubDevice with process data does not reach SAFEOP then; `ringcat init` and \
                                     `ringcat esi declare` write the tables `[[subdevice.sync_manager]]`";
-/// What the ENI of a SubDevice means that has SyncManagers, and not this one.
+/// Consequence of an ENI that has some SyncManagers of a SubDevice, but not this one.
 const WITHOUT_TABLE: &str = "the file has no table of it, and an ENI leaves none to the EEPROM: if the SubDevice has \
                              process data there, it does not reach SAFEOP; a table without `length` and without PDOs \
                              declares that it has none";
@@ -104,15 +104,16 @@ fn limits(configuration: &Configuration, index: usize, of: &SubDevice) -> Result
     }
 }
 
-/// Couplers, extensions and junctions have no process data. Their ports show them: of two kinds, or more than two.
+/// Couplers, extensions and junctions have no process data. They are recognised by ports of two kinds, or more than two
+/// ports.
 fn is_coupler(of: &SubDevice) -> bool {
     let ports: Vec<char> = of.ports.chars().filter(|kind| !kind.is_whitespace()).collect();
     let has_branches = ports.len() > 2 || ports.windows(2).any(|pair| pair[0] != pair[1]);
     has_branches && of.mailbox.is_none() && of.domain.is_none() && of.sync.is_none()
 }
 
-/// SyncManagers of process data that a SubDevice may have and its file does not: those below its last one, and with
-/// mailboxes, which are SyncManagers 0 and 1, both 2 and 3 (protocol 3.11).
+/// SyncManagers of process data that a SubDevice may have and that the file does not contain: those below its last one,
+/// and with mailboxes, which are SyncManagers 0 and 1, both 2 and 3 (protocol 3.11).
 fn without_table(declared: &[DeclaredSyncManager], of: &SubDevice) -> impl Iterator<Item = u8> {
     let of_data: BTreeSet<u8> = declared.iter().filter_map(|it| Some(it.area()?.sync_manager)).collect();
     let last = of_data.last().copied().unwrap_or_default();

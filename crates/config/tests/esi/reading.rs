@@ -137,7 +137,7 @@ fn unusual_files_are_read_and_noted() {
 
 // covers: esi-read, ES-15, ES-20
 #[test]
-fn second_definitions_and_names_of_nothing_are_notices_with_their_lines() {
+fn duplicate_definitions_and_undefined_names_are_notices_with_their_lines() {
     let acme = ACME;
     let object = "<Object><Index>#x8000</Index><Name>Second</Name><Type>UDINT</Type><BitSize>32</BitSize></Object>";
     let group = "<Group SortOrder=\"30\"><Type>AcmeIo</Type><Name>Second</Name></Group></Groups>";
@@ -151,17 +151,17 @@ fn second_definitions_and_names_of_nothing_are_notices_with_their_lines() {
     for (text, expected) in [
         (acme.replacen("</Objects>", &format!("{object}</Objects>"), 1), "Object 0x8000 of line 87 is there already"),
         (acme.replacen("</Groups>", group, 1), "Group \"AcmeIo\": the one of line 11 counts"),
-        (acme.replacen("<GroupType>AcmeDrives<", "<GroupType>Acme<", 1), "GroupType \"Acme\" names no group"),
-        (acme.replacen("<Type>DT6000</Type>", "<Type>NOTYPE</Type>", 1), "the type \"NOTYPE\" is not described"),
-        (acme.replacen("<BaseType>UINT<", "<BaseType>NOBASE<", 1), "the type \"NOBASE\" is not described"),
-        (twice, "SubIdx 2 is there twice, the first counts"),
+        (acme.replacen("<GroupType>AcmeDrives<", "<GroupType>Acme<", 1), "GroupType \"Acme\": there is no such group"),
+        (acme.replacen("<Type>DT6000</Type>", "<Type>NOTYPE</Type>", 1), "the type \"NOTYPE\" is not defined"),
+        (acme.replacen("<BaseType>UINT<", "<BaseType>NOBASE<", 1), "the type \"NOBASE\" is not defined"),
+        (twice, "SubIdx 2 is defined twice, the first one is used"),
     ] {
         let esi = acme_of(&text);
         let added: Vec<String> = esi.notices.iter().map(ToString::to_string).collect();
         assert_eq!(added.len(), plain + 1, "{expected}: {added:?}");
         assert!(added.iter().any(|notice| notice.contains(expected)), "{expected}: {added:?}");
     }
-    // The first object counts.
+    // The first object is used.
     let text = acme.replacen("</Objects>", &format!("{object}</Objects>"), 1);
     let esi = acme_of(&text);
     let objects = esi.devices.iter().flat_map(|device| &device.profiles).flat_map(|it| it.dictionary.as_deref());

@@ -28,8 +28,8 @@ pub fn model(path: &Path) -> Esi {
     esi::read(&name(path), &fs::read(path).unwrap()).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Notices of second definitions and of names of nothing.
-const NOTED: [&str; 5] = ["is there already", "the one of line", "names no group", "is not described", "SubIdx"];
+/// Notices of duplicate definitions, and of undefined groups and types.
+const NOTED: [&str; 5] = ["is there already", "the one of line", "no such group", "is not defined", "SubIdx"];
 
 /// What the limits of the reader are above of.
 // covers: ES-02, ES-04

@@ -143,8 +143,8 @@ fn product_code_and_serial_number_are_compared_as_the_file_says() {
 fn each_setting_without_a_place_in_a_network_file_is_a_notice() {
     const CASES: [(&str, &str, &str); 7] = [
         ("<Dc>", "<Dc PotentialReferenceClock=\"1\">", "PotentialReferenceClock: "),
-        ("<EoE ", "<AoE InitializeOwnNetId=\"1\"/><EoE ", "AoE InitializeOwnNetId: no AMS net id is sent"),
-        ("<EoE ", "<AoE GenerateOwnNetId=\"1\"/><EoE ", "AoE GenerateOwnNetId: no AMS net id is chosen"),
+        ("<EoE ", "<AoE InitializeOwnNetId=\"1\"/><EoE ", "AoE InitializeOwnNetId: no AMS NetId is sent"),
+        ("<EoE ", "<AoE GenerateOwnNetId=\"1\"/><EoE ", "AoE GenerateOwnNetId: no AMS NetId is chosen"),
         ("<Mailbox", "<Su SeparateSu=\"1\"/><Mailbox", "Su SeparateSu: "),
         ("<Mailbox", "<Su SeparateFrame=\"1\"/><Mailbox", "Su SeparateFrame: "),
         (" ProductCode", " UseLrdLwr=\"1\" ProductCode", "UseLrdLwr: "),

@@ -118,7 +118,7 @@ fn a_description_of_30000_categories_is_made_in_linear_time() {
 
 // covers: ES-105, esi-use
 #[test]
-fn fields_that_images_of_vendors_lose_in_a_description_are_listed_notices() {
+fn fields_of_vendor_images_without_a_place_in_a_description_are_listed() {
     let mut found = String::new();
     for path in files("sii").iter().filter(|path| path.extension().is_some_and(|ending| ending == "bin")) {
         let image = fs::read(path).unwrap();

@@ -170,7 +170,7 @@ fn addresses_cables_groups_and_places_of_a_written_file_are_those_of_the_network
 
 // covers: ES-115, eni-run
 #[test]
-fn a_written_file_begins_with_the_commands_for_the_whole_bus() {
+fn an_exported_eni_begins_with_the_commands_for_the_whole_bus() {
     let expected: [(u16, usize, &[u8]); 9] = [
         (0x0010, 2, &[]),
         (0x0300, 8, &[]),
@@ -236,11 +236,11 @@ fn fmmus_and_sync_managers_have_the_bytes_of_files_of_tools() {
 
 // covers: ES-178, eni-run
 #[test]
-fn written_files_count_subdevices_down_and_read_identities_by_word() {
+fn exported_auto_increment_addresses_count_down_identities_are_read_by_word() {
     let eni = exported();
     let places: Vec<u16> = eni.subdevices.iter().take(4).filter_map(|it| it.auto_increment).collect();
     assert_eq!(places, [0, 65535, 65534, 65533]);
-    // Those without an identity in the network file have none to compare.
+    // SubDevices without an identity in the network file have no identity to compare.
     let expected = network(CELL).configuration().declaration.subdevices;
     let expected = expected.iter().filter(|it| it.expected.vendor_id.is_some() && it.expected.product_code.is_some());
     let (expected, mut compared) = (expected.count(), 0);

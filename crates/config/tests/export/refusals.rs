@@ -121,7 +121,7 @@ fn settings_that_an_eni_has_no_place_for_are_listed() {
 /// a scan or a description.
 // covers: eni-run
 #[test]
-fn mailboxes_left_to_the_eeprom_are_listed_if_a_subdevice_may_need_one() {
+fn mailboxes_left_to_the_eeprom_are_listed_if_a_subdevice_may_need_them() {
     let listed = |file: &NetworkFile| -> Vec<(Option<usize>, String)> {
         let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
         let left_out = export.left_out.into_iter().filter(|it| it.what == "mailbox");
@@ -162,7 +162,8 @@ fn a_sync_manager_without_a_table_beside_others_is_listed() {
         // Without the mailbox, the numbers show it.
         file.subdevice[DRIVE].mailbox = None;
         assert_eq!(listed(&file), one(number));
-        // A table without a length and without PDOs declares that there is none; a length of 0 leaves it to the EEPROM.
+        // A table without a length and without PDOs declares that there is no process data; a length of 0 leaves it to
+        // the EEPROM.
         for (length, expected) in [(None, vec![]), (Some(0), one(number))] {
             let mut file = network(CELL);
             let table = &mut file.subdevice[DRIVE].sync_manager[at];
@@ -181,7 +182,7 @@ fn a_sync_manager_without_a_table_beside_others_is_listed() {
     assert_eq!(what, "sync_manager 1");
 }
 
-/// Sent after the PDOs, the commands undo the tables.
+/// Commands that are sent after the PDOs undo the tables.
 // covers: eni-run, ES-125
 #[test]
 fn start_up_commands_that_leave_other_process_data_than_the_tables_are_refused() {

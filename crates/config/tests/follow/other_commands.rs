@@ -310,7 +310,7 @@ fn commands_to_the_whole_bus_have_a_limit_and_many_on_ways_to_init_take_no_time(
     assert_eq!(drive(&many).startup.iter().filter(|it| it.transition == Transition::Oi).count(), 60_001);
 }
 
-/// The seed of the fuzz target: it is followed, with each kind of command and of group.
+/// The seed of the fuzz target: an ENI with each kind of command and of group, which is followed.
 // covers: 8.2, eni-image
 #[test]
 fn the_file_with_every_kind_of_command_is_followed() {

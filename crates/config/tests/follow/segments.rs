@@ -106,7 +106,7 @@ fn two_groups(name: &str, ado: u16, value: &str) -> String {
 
 // covers: 8.2, hot-connect, eni-image
 #[test]
-fn two_groups_with_one_mark_or_name_are_refused_with_the_line() {
+fn two_groups_with_one_identifier_or_name_are_refused_with_the_line() {
     configured(&two_groups("Tool", 18, "3512"));
     configured(&two_groups("Tool", 308, "3412"));
     for (ado, mark) in [(18, "alias 4660"), (308, "identification 4660"), (4096, "data word 4660 at 0x1000")] {
@@ -127,7 +127,7 @@ fn two_groups_with_one_mark_or_name_are_refused_with_the_line() {
 
 // covers: 8.2, hot-connect, eni-image
 #[test]
-fn a_group_with_several_marks_is_refused_with_the_line_of_the_second() {
+fn a_group_with_several_identifiers_is_refused_with_the_line_of_the_second() {
     let command = &GROUP[GROUP.find("<IdentifyCmd>").expect("a command")..GROUP.find("</HotConnect>").expect("an end")];
     let twice = |second: &str| with(&[(HEAD, &GROUP.replace("</HotConnect>", &format!("{second}</HotConnect>")))]);
     configured(&twice(command));

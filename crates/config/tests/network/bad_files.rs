@@ -230,7 +230,7 @@ fn two_subdevices_at_one_port_are_refused_unless_they_take_turns() {
     NetworkFile::read("turns.toml", file("optional = true").as_bytes()).expect("one of them may be absent");
 }
 
-/// A file of SubDevices with these keys, in an order with lines of their own.
+/// A file of SubDevices with these keys, each key in a line of its own.
 fn marked(subdevices: &[&str]) -> String {
     let head = "ringcat_network = 1\n[[domain]]\nname = \"d\"\nperiod = \"1ms\"\n";
     let subdevices = subdevices.iter().enumerate();
@@ -240,7 +240,7 @@ fn marked(subdevices: &[&str]) -> String {
 
 // covers: network-file
 #[test]
-fn a_mark_that_two_subdevices_have_is_refused_with_its_line() {
+fn two_subdevices_with_one_identifier_are_refused_with_the_line() {
     let word = "identification = 7; identification_word = 0x1000";
     for (mark, shown, key) in [
         ("alias = 7", "alias 7", "alias"),

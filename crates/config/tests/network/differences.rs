@@ -147,10 +147,10 @@ fn a_found_subdevice_has_the_modules_and_pdos_of_its_own_declaration() {
     assert!(!configuration.declares_modules(2) && !configuration.has_unlisted_pdos(2, &found[2]));
 }
 
-/// The activation takes the one that it needs; the other one is absent, and nothing is compared with it.
+/// The activation takes the mandatory one; the optional one is absent, and nothing is compared with it.
 // covers: network-file
 #[test]
-fn of_two_alike_subdevices_the_optional_one_is_the_missing_one() {
+fn of_two_equal_subdevices_the_optional_one_is_the_missing_one() {
     for (products, optional, there, missing) in [
         (&[1, 1][..], &[0][..], &[1][..], 0),
         (&[1, 1], &[1], &[1], 1),

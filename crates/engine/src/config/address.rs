@@ -28,12 +28,12 @@ pub enum ConfigAddress {
         /// Number of SubDevices behind it.
         offset: u16,
     },
-    /// `offset` SubDevices behind the one with this value in a word of its memory, which the SII need not name
+    /// `offset` SubDevices behind the one with this value in a word of its memory. The SII need not name the word
     /// (protocol 4.3). The word is read between the scan and the activation (`MainDevice::start_loaded_data_words`).
     DataWord {
         /// Physical address of the word.
         register: RegisterAddress,
-        /// Its value.
+        /// Value of the word.
         value: u16,
         /// Number of SubDevices behind it.
         offset: u16,

@@ -46,7 +46,7 @@ pub enum PulseGrid {
     #[default]
     SystemTime,
     /// Multiples of the cycle after the first time that the application has set (`Exchange::set_application_time`), as
-    /// IgH does. Signals wait up to 1 s for it; those that start without are aligned to system time.
+    /// IgH does. Signals wait up to 1 s for this time; if it is not set by then, they are aligned to system time.
     FirstApplicationTime,
 }
 

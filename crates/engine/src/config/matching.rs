@@ -40,7 +40,7 @@ pub(super) fn missing(declared: &SubDeviceConfig, config: usize, error: ConfigEr
     if declared.optional { Resolution::Absent { config, error } } else { Resolution::Failed { config, error } }
 }
 
-/// What identifies a SubDevice at any place.
+/// What identifies a SubDevice at any place: its alias, identification or a data word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Mark {
     Alias(u16),
@@ -49,7 +49,7 @@ enum Mark {
 }
 
 impl Mark {
-    /// The mark from which an address counts; `None` for a position, and for alias 0, which is one.
+    /// The mark that an address refers to; `None` for a position, and for alias 0, which means a position.
     const fn of(address: ConfigAddress) -> Option<Mark> {
         match address {
             ConfigAddress::Alias { alias: 0, .. } | ConfigAddress::Position(_) => None,
@@ -85,8 +85,8 @@ impl Marked {
     }
 
     /// Indices of all SubDevices with the alias, identification or data word of an address, in their order. An
-    /// activation takes the only one, and refuses the declaration if there are several. None for a position and for
-    /// alias 0, which is one.
+    /// activation uses the SubDevice if it is the only one, and refuses the declaration if there are several. Empty for
+    /// a position and for alias 0, which means a position.
     pub fn all(&self, address: ConfigAddress) -> impl Iterator<Item = usize> {
         let mark = Mark::of(address);
         let first = self.marks.partition_point(|(other, _)| Some(*other) < mark);

@@ -83,7 +83,7 @@ impl Clients {
         self.all.iter_mut().for_each(|client| client.missed += lost);
     }
 
-    /// An event is not kept: clients that asked for its subject miss it.
+    /// An event that is not kept is counted as missed for clients that have requested its subject.
     pub fn miss_one(&mut self, event: &Event) {
         let subject = event.subject();
         self.all.iter_mut().filter(|client| client.subjects.has(subject)).for_each(|client| client.missed += 1);

@@ -18,7 +18,8 @@ use crate::time::Instant;
 const FOREIGN_KEPT: usize = 8;
 /// Events kept, fetched or not; beyond, the oldest is dropped.
 const KEPT: usize = 4096;
-/// Events of the cyclic half among them that may take the place of others.
+/// Number of events of the cyclic half beyond which a full log drops the oldest of these, and no event of the acyclic
+/// half.
 const CYCLIC_KEPT: usize = KEPT / 4;
 
 /// The events from a number on, as far as they are kept.
@@ -44,7 +45,7 @@ struct Kept {
 }
 
 impl Kept {
-    /// The number of the oldest event, and that of the oldest one that was not fetched; the largest number without one.
+    /// The numbers of the oldest event and of the oldest event that was not fetched; `u64::MAX` if there is none.
     fn fronts(&self) -> [u64; 2] {
         [0, self.fetched].map(|at| self.events.get(at).map_or(u64::MAX, |event| event.number))
     }
@@ -66,7 +67,7 @@ impl Kept {
     }
 }
 
-/// Events of both halves. A fault that is an event in each cycle takes only a part of the room.
+/// Events of both halves. A fault that causes an event in each cycle does not displace all other events.
 #[derive(Debug, Default)]
 pub struct EventLog {
     epoch: u64,
@@ -172,7 +173,8 @@ impl EventLog {
         self.clients.take(client)
     }
 
-    /// Drops the oldest event: of the cyclic half, if more than its part is kept of that one with the next event.
+    /// Drops the oldest event; the oldest event of the cyclic half if that half would exceed [`CYCLIC_KEPT`] with the
+    /// next event.
     fn drop_oldest(&mut self, is_next_cyclic: bool) {
         let [acyclic, cyclic] = [&self.acyclic, &self.cyclic].map(|kept| kept.fronts()[0]);
         let is_crowded = self.cyclic.events.len() + usize::from(is_next_cyclic) > CYCLIC_KEPT;
@@ -183,7 +185,7 @@ impl EventLog {
         }
     }
 
-    /// Events that were lost before they reached the log: they have numbers, which are missing in it.
+    /// Events that were lost before they reached the log: they get numbers, and the log has a gap there.
     pub fn skip(&mut self, lost: u64) {
         self.next += lost;
         self.dropped += lost;

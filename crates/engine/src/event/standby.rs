@@ -76,7 +76,7 @@ pub enum StandbyEvent {
     /// After [`StandbyEvent::NoActive`]: an ACTIVE sends process data again.
     ActiveIsBack,
     /// The declared watchdog of a SubDevice with outputs is not longer than the time for which process data may be
-    /// missing in a takeover: the SubDevice leaves OP during a takeover. Reported once when the policy is set.
+    /// missing in a takeover: the SubDevice then leaves OP. Reported once when the policy is set.
     WatchdogTooShort {
         /// The SubDevice.
         subdevice: SubDeviceId,

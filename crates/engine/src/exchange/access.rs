@@ -173,8 +173,8 @@ impl Exchange {
         self.evidence.clocks.set_application_time(time, now);
     }
 
-    /// A first time of the application that it had at an earlier moment: the grid of SYNC pulses begins with it
-    /// (`PulseGrid`). To be called before [`Exchange::set_application_time`].
+    /// Sets the first application time, which was valid at the earlier instant `at`: the grid of SYNC pulses begins
+    /// with this time (`PulseGrid`). To be called before [`Exchange::set_application_time`].
     pub fn set_first_application_time(&mut self, time: u64, at: Instant) {
         self.board.clocks.times.post_application_time(time, at.0);
     }

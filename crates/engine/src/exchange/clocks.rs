@@ -36,8 +36,8 @@ pub(crate) const CLOCK_DATA: usize = 4;
 /// Beyond this difference the reference is not steered: its control loop would take more than a tenth of a second, and
 /// the clocks that follow it could not. The supervisor sets all clocks, or continues with another shift.
 const FAR_NS: i64 = 100_000;
-/// A reading that is older than this says nothing of a reference that was steered since: it has the time that was
-/// written.
+/// A reading that is older than this is not used for a reference that was steered since: the reference then has the
+/// time that was written.
 const OLD_NS: u64 = 100_000_000;
 /// Event requests in the header of a datagram.
 const IRQ_AT: usize = HEADER_LEN - 2;

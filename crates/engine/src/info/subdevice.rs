@@ -126,7 +126,8 @@ pub struct SubDeviceInfo {
     pub identity: Identity,
     /// Explicit device identification, as set at its switches; `None` if it has none (protocol 5.3, 4.3).
     pub identification: Option<u16>,
-    /// The words of its memory by which a declaration finds SubDevices and that it has, as read last.
+    /// Words of its memory that declarations use to find SubDevices, as read last; without words that its memory does
+    /// not have.
     pub data_words: Vec<DataWord>,
     /// The controller.
     pub controller: ControllerInfo,
@@ -219,9 +220,10 @@ impl SubDeviceInfo {
         self.warnings.iter().any(|warning| warning.problem.is_grave())
     }
 
-    /// Takes over the PDOs that were read before from the object dictionary of a SubDevice of this type. It may hold
-    /// others now, unless they are those of power-on and a serial number shows that it is the same one: another one may
-    /// have other modules, or other parameters in its memory. What is not certain is compared when it is configured.
+    /// Takes over the PDOs that were read before from the object dictionary of a SubDevice of this type. The SubDevice
+    /// may have other PDOs now, unless these are the PDOs after power-on and the serial number shows that it is the
+    /// same SubDevice: another SubDevice may have other modules, or other parameters in its memory. PDOs that are not
+    /// certain are compared during the configuration.
     pub(crate) fn keep_dictionary(&mut self, known: &SubDeviceInfo) {
         let kind = |it: &SubDeviceInfo| (it.identity.vendor_id, it.identity.product_code);
         let is_read = self.pdo_source.is_of_dictionary();

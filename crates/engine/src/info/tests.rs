@@ -345,7 +345,7 @@ proptest! {
     }
 }
 
-/// Two terminals of one type look alike without a serial number; their modules and parameters may differ.
+/// Two terminals of one type cannot be distinguished without a serial number; their modules and parameters may differ.
 // covers: 5.1, api
 #[test]
 fn pdos_of_a_dictionary_are_certain_only_with_the_same_serial_number() {
@@ -367,12 +367,12 @@ fn pdos_of_a_dictionary_are_certain_only_with_the_same_serial_number() {
         let mut found = info(1, serial, PdoSource::Sii, Vec::new());
         found.keep_dictionary(&known(before));
         assert_eq!((found.pdo_source, &found.pdos), (expected, &read), "{serial}, {before}");
-        // It loses its power again before it was configured.
+        // The SubDevice loses its power again before it is configured.
         let mut again = info(1, serial, PdoSource::Sii, Vec::new());
         again.keep_dictionary(&found);
         assert_eq!((again.pdo_source, &again.pdos), (expected, &read), "{serial}, {before} again");
     }
-    // A boot loader may have brought another revision; what was in doubt stays in doubt.
+    // A firmware update may have changed the revision; PDOs that were uncertain remain uncertain.
     for (revision, source) in [(2, PdoSource::Outdated), (1, PdoSource::Outdated)] {
         let mut found = info(revision, 5, source, Vec::new());
         found.keep_dictionary(&known(5));
@@ -385,7 +385,7 @@ fn pdos_of_a_dictionary_are_certain_only_with_the_same_serial_number() {
     other.identity.product_code = 8;
     other.keep_dictionary(&known(5));
     assert_eq!((other.pdo_source, other.pdos.len()), (PdoSource::Sii, 0));
-    // What was read of this one counts more.
+    // PDOs that were read from this SubDevice have priority.
     let own = pdos(0x1A01);
     let mut found = info(1, 5, PdoSource::Dictionary, own.clone());
     found.keep_dictionary(&known(5));

@@ -37,8 +37,8 @@ pub struct ReceivedEmergency {
     pub emergency: Emergency,
 }
 
-/// Emergencies of one SubDevice: the oldest that were not taken; more are counted. Copies are handles to the same ring,
-/// for any thread.
+/// Emergencies of one SubDevice: the oldest that were not taken; more are counted. Copies are handles to the same ring
+/// buffer, for any thread.
 #[derive(Clone, Debug)]
 pub struct EmergencyRing {
     shared: Arc<Slots>,
@@ -66,7 +66,7 @@ impl EmergencyRing {
     /// Number of emergencies that it holds.
     pub fn len(&self) -> usize {
         let read = self.shared.read.load(Ordering::Acquire);
-        // A reader may take some between both.
+        // A reader may take some emergencies between the two loads.
         let count = self.shared.written.load(Ordering::Acquire).saturating_sub(read) as usize;
         count.min(self.size())
     }
@@ -125,7 +125,7 @@ impl EmergencyRing {
 #[derive(Debug, Default)]
 pub(crate) struct EmergencyRings {
     rings: BTreeMap<Address, EmergencyRing>,
-    /// Rings of positions that SubDevices have left, while others have these positions.
+    /// Ring buffers of positions that SubDevices have left, as long as other SubDevices have these positions.
     left: BTreeMap<Position, EmergencyRing>,
 }
 
@@ -153,13 +153,13 @@ impl EmergencyRings {
         self.rings.remove(&subdevice);
     }
 
-    /// A SubDevice has left this position. The next one that comes there goes on with its ring.
+    /// A SubDevice has left this position. The next SubDevice at this position continues with its ring buffer.
     pub(crate) fn leave(&mut self, position: Position, ring: EmergencyRing) {
         self.rings.remove(&position.into());
         self.left.insert(position, ring);
     }
 
-    /// The ring of a SubDevice that has come to this position.
+    /// The ring buffer of a SubDevice that is at this position now.
     pub(crate) fn arrive(&mut self, position: Position) -> EmergencyRing {
         match self.left.remove(&position) {
             Some(ring) => {
@@ -170,7 +170,7 @@ impl EmergencyRings {
         }
     }
 
-    /// All SubDevices have their positions: rings of positions without a SubDevice can be asked for.
+    /// All SubDevices have their positions: ring buffers of positions without a SubDevice can be requested again.
     pub(crate) fn end_changes(&mut self) {
         let EmergencyRings { rings, left } = self;
         left.retain(|position, ring| {

@@ -7,8 +7,8 @@ impl MainDevice {
     /// Registers a client of events with a queue of `size` events, at most 4,096, and with the subjects that it asks
     /// for. It stays registered over activations and stops. `None` if there are 64 clients.
     ///
-    /// Its queue is beside the events of the application: if one of them does not fetch its events, the other loses
-    /// none.
+    /// Its queue is separate from the events of the application: if one of the two does not fetch its events, the other
+    /// loses none.
     pub fn register_client(&mut self, subjects: Subjects, size: usize) -> Option<ClientId> {
         self.supervisor.with_events(|events| events.add_client(subjects, size))
     }

@@ -118,7 +118,8 @@ impl MainDevice {
                 let left = restore_within(&bus, &segment, limit).await;
                 deactivate(&bus, &segment, &options, remainder, left).await
             };
-            // Another application sets other states, a scan gives addresses: nothing is brought to PREOP any more.
+            // Another application requests other states, a scan assigns addresses: no SubDevice is brought to PREOP any
+            // more.
             let result = segment.unless(|model| model.is_active() || model.has_another_scan(scan), work).await;
             *slot.borrow_mut() = Some(result.unwrap_or(Err(StopError::Ended)));
             if is_kept {

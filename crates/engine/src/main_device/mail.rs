@@ -92,9 +92,9 @@ impl MainDevice {
     /// by its position without a declaration. While a declaration is active, such a SubDevice has an open mailbox with
     /// idle operation only.
     ///
-    /// A stop ends all rings, a new scan those of positions: they keep what they hold, and get no further emergencies.
-    /// The ring of a position follows its SubDevice to another one; after a loss of power it goes on with the SubDevice
-    /// that comes to the position.
+    /// A stop ends all ring buffers, a new scan those of positions: they keep what they hold, and get no further
+    /// emergencies. The ring buffer of a position follows its SubDevice to another position; after a loss of power the
+    /// next SubDevice at the position uses it.
     pub fn emergencies(&mut self, subdevice: impl Into<Address>) -> EmergencyRing {
         let subdevice = self.declared_or(subdevice);
         self.emergencies.borrow_mut().of(subdevice)

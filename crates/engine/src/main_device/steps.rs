@@ -63,8 +63,9 @@ impl MainDevice {
         Ok(())
     }
 
-    /// Reads words of the memory of each SubDevice of the last scan: those by which declared ones are found
-    /// ([`ConfigAddress::DataWord`](crate::config::ConfigAddress)). The result is what is known of the SubDevices then.
+    /// Reads words of the memory of each SubDevice of the last scan, by which declared SubDevices are found
+    /// ([`ConfigAddress::DataWord`](crate::config::ConfigAddress)). The result is all that is known of the SubDevices
+    /// after that.
     pub fn start_data_words(&mut self, words: Vec<RegisterAddress>) -> Pending<Vec<SubDeviceInfo>> {
         let (bus, segment) = (self.supervisor.bus(), self.segment.clone());
         let own = bus.clone();
@@ -116,7 +117,7 @@ impl MainDevice {
                 let closings: Vec<Closing> = declared.closings.iter().map(|(_, closing)| *closing).collect();
                 let reached = Reached { nodes: &declared.nodes, stations: &declared.stations };
                 let refuted = refute((&testing, &of), reached, declared.main_count, &closings).await;
-                // The test has read the ports.
+                // The test has read the ports, which has cleared the events that show a change.
                 let ports = declared.nodes.iter().map(|node| node.dl_status);
                 let scanned: Vec<_> = declared.stations.iter().copied().zip(ports).collect();
                 are_ports_as_scanned(&testing, &of, &scanned).await;

@@ -19,7 +19,7 @@ const LONGEST_PAUSE: Duration = Duration::from_millis(10);
 /// How long a SubDevice may take to clear its error bit after the acknowledgement.
 const ACKNOWLEDGE_LIMIT: Duration = Duration::from_millis(500);
 
-/// How long a request of a procedure that has ended is waited for.
+/// Maximum wait for the effect of a request of a procedure that has ended.
 const PENDING_LIMIT: Duration = Duration::from_millis(500);
 /// Bytes from AL control to the end of AL status code.
 const CONTROL_TO_CODE: usize = (map::AL_STATUS.0 - map::AL_CONTROL.0) as usize + 6;
@@ -90,10 +90,10 @@ pub async fn read_status(bus: &Bus, station: StationAddress) -> Result<(AlStatus
     Ok((status, code))
 }
 
-/// AL status after a request that is under way has ended: of a procedure that has ended meanwhile, or of another
-/// program. Until then the SubDevice shows the state before, which a request for that state would take for its own
-/// end; and it does not take another request before it has read that one (protocol 3.4). A state that its application
-/// has left by itself looks alike: the wait has a limit.
+/// AL status after a pending request of a procedure that has ended, or of another program, has taken effect. Until then
+/// the SubDevice shows its previous state, which a new request for that state would take for its own effect; and the
+/// SubDevice ignores another request until it has read the pending one (protocol 3.4). A SubDevice whose application
+/// has left its state by itself cannot be distinguished from this, so the wait has a limit.
 pub(super) async fn read_quiet_status(bus: &Bus, station: StationAddress) -> Result<AlStatus, BusError> {
     let until = bus.now() + PENDING_LIMIT;
     let mut pause = FIRST_PAUSE;

@@ -101,7 +101,7 @@ pub(super) async fn cabling(
     found
 }
 
-/// Waits until a link is up again that an ended procedure had taken down: before that a scan would find the ring open.
+/// Waits until a link is up again that an ended procedure had taken down: until then a scan would find the ring open.
 pub(crate) async fn until_link_returns(bus: &Bus, segment: &SharedSegment) {
     if !segment.view().is_link_returning() {
         return;

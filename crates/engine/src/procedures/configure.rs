@@ -53,7 +53,7 @@ pub(super) struct BringUp<'a> {
     pub config: Rc<SubDeviceConfig>,
     pub target: AlState,
     pub mailbox: Mailbox,
-    /// Its SYNC signals were started although its clock was not right in time.
+    /// The SYNC signals of the SubDevice were started although its clock was not right in time.
     pub goes_on_unlocked: Cell<bool>,
 }
 
@@ -254,7 +254,7 @@ impl BringUp<'_> {
     /// Commands of SO; waits until clocks are locked and outputs flow, then OP.
     pub(super) async fn op(&self) -> Result<(), ConfigureError> {
         self.command(Transition::So).await?;
-        // The wait for its clock is over already if it goes on without.
+        // If the SubDevice continues without a locked clock, the wait for its clock has already ended.
         if self.config.sync.is_some() && !self.goes_on_unlocked.take() {
             let member = (self.index, self.attempt);
             clocks::wait_for_lock(self.bus, self.segment, member).await.map_err(ConfigureError::NotLocked)?;

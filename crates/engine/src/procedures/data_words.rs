@@ -1,5 +1,5 @@
-//! Words of the memory of SubDevices by which declarations find them, although the SII need not name them (protocol
-//! 4.3).
+//! Words in the memory of SubDevices by which declarations find the SubDevices; the SII need not name these words
+//! (protocol 4.3).
 
 use alloc::vec::Vec;
 
@@ -11,11 +11,11 @@ use crate::info::{DataWord, SubDeviceInfo};
 use crate::segment::{More, Observation};
 use crate::supervisor::{Bus, BusError};
 
-/// Reads of a word that no SubDevice answers: a frame may be lost, or the memory does not exist.
+/// Attempts to read a word: without an answer a frame may be lost, or the memory does not exist.
 const ATTEMPTS: u32 = 3;
 
-/// Reads the words of each SubDevice of the scan, for those that find a declaration. A SubDevice without such a memory
-/// has none. False if frames were lost: words that were read before are kept then.
+/// Reads these words of each SubDevice of the scan. A SubDevice without such memory has no words. False if frames were
+/// lost: then the words that were read before are kept.
 pub(crate) async fn read_of_scan(bus: &Bus, segment: &SharedSegment, words: &[RegisterAddress]) -> bool {
     if words.is_empty() {
         return true;

@@ -77,13 +77,13 @@ pub(crate) async fn deactivate(
     // Reading the states of the late ones belongs to the limit.
     let is_settled = bus.within(time.saturating_sub(REPORT), settling).await;
     if segment.view().kept().is_empty() {
-        // None is known any more that could confirm it.
+        // No SubDevice is known any more that could confirm PREOP.
         return if declared.is_empty() { Ok(()) } else { stopped };
     }
     if is_settled == Ok(true) || segment.view().unsettled().is_empty() {
         return Ok(());
     }
-    // A refusal is certain before the limit.
+    // If all attempts have ended, a refusal is certain before the limit.
     let had = if is_settled.is_ok() { bus.now().since(begun) } else { limit };
     match bus.within(until.since(bus.now()), late(bus, segment, &declared, had)).await {
         Ok(Late::Others(late)) => Err(late),
@@ -111,17 +111,17 @@ async fn scan_until(
     }
 }
 
-/// What the states of late SubDevices are.
+/// Result of reading the states of late SubDevices.
 enum Late {
-    /// Some answer and are not in PREOP.
+    /// SubDevices answer that are not in PREOP: the error.
     Others(StopError),
-    /// None answers.
+    /// No SubDevice answers.
     Absent,
-    /// It cannot be read, or shows PREOP too late for a mailbox.
+    /// A state cannot be read, or is PREOP although the attempt has not ended.
     Unknown,
 }
 
-/// Reads the states of those that have not reached theirs.
+/// Reads the states of the SubDevices that have not reached their requested states.
 async fn late(bus: &Bus, segment: &SharedSegment, declared: &[ToStop], limit: Duration) -> Late {
     let unsettled = segment.view().unsettled();
     let states = bus.gather(unsettled, |bus, it| async move { (it, read_status(&bus, it.0.station).await) }).await;
@@ -133,7 +133,7 @@ async fn late(bus: &Bus, segment: &SharedSegment, declared: &[ToStop], limit: Du
     };
     let others = others.count();
     let (station, requested) = (key.station, AlState::PreOp);
-    // The attempt has acknowledged its refusal.
+    // The attempt has acknowledged the refusal, so AL status no longer shows its code.
     let code = match segment.undeclared.result(key, attempt) {
         Some(Err(ConfigureError::State(StateError::Refused { code, .. }))) => code,
         Some(_) | None => code,

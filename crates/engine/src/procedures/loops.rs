@@ -1,8 +1,8 @@
 //! Loop settings of ports that are changed for a moment, and restored (protocol 2.2, DL control bit 1).
 //!
-//! They are restored to what the application orders by then: a port that it closes meanwhile stays closed. If the
-//! application ends meanwhile, or one begins, they are restored before anything else is done; without a frame they
-//! expire.
+//! They are restored to what the application orders by then: a port that it closes meanwhile stays closed. If an
+//! application ends or begins meanwhile, they are restored before anything else is done; if no frame reaches the
+//! SubDevice, they expire.
 
 use alloc::format;
 use alloc::string::{String, ToString};

@@ -78,7 +78,7 @@ pub(super) async fn keep_up(
                 Box::pin(frame_limit::explain(bus, segment)).await;
                 segment.observe_member((index, attempt), MemberFinding::Failed(problem(&error)));
             }
-            // A request of another program, or of a procedure that had ended, came between.
+            // A late request of another program, or of a procedure that has ended, took effect meanwhile.
             Err(error) if was_changed(&error) && !core::mem::replace(&mut disturbed, true) => {
                 bus.sleep(READ_PAUSE).await;
                 continue;
@@ -143,8 +143,8 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
     }
 }
 
-/// The SubDevice has refused a state because it was not as this configuration had left it: in another state than the
-/// one before (AL status code 0x0011), or asked for PREOP before its mailboxes were enabled (0x0016).
+/// The SubDevice has refused a state because another request took effect meanwhile: it was in another state than the
+/// preceding one (AL status code 0x0011), or PREOP was requested before its mailboxes were enabled (0x0016).
 fn was_changed(error: &ConfigureError) -> bool {
     let ConfigureError::State(al_state::StateError::Refused { requested, status, code }) = error else { return false };
     let before = match requested {

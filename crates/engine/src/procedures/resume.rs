@@ -33,7 +33,7 @@ use crate::supervisor::{Bus, BusError};
 /// Pause between two rounds while the segment does not answer, or changes.
 const PAUSE: Duration = Duration::from_millis(2);
 
-/// Scans after which the segment may differ again, however long they take.
+/// Number of scans after which the segment may differ again, however long the scans take.
 const SCANS: u32 = 3;
 
 /// What another process knew.

@@ -256,7 +256,8 @@ impl SharedSegment {
         is_done
     }
 
-    /// A place in the queue of disturbances: later ones of this kind wait until it is dropped.
+    /// A place in the queue of procedures that disturb the segment: later disturbances of this kind wait until it is
+    /// dropped.
     pub(super) fn queue_up(&self, disturbance: Disturbance) -> Turn {
         Turn::new(self, disturbance)
     }

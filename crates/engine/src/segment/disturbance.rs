@@ -99,8 +99,8 @@ impl Slot {
         Slot { isolations, next_number: self.next_number, ..Slot::default() }
     }
 
-    /// The same for an application that begins: a procedure that has closed ports for a moment ends then, and its turn
-    /// with it.
+    /// The same for an application that begins: a procedure that has closed ports for a moment ends then, and releases
+    /// its turn.
     pub fn emptied_for_application(&self) -> Slot {
         let running = self.running.filter(|(running, _)| running.disturbance == Disturbance::OpenByPort);
         Slot { running, ..self.emptied() }

@@ -63,7 +63,7 @@ pub struct Member {
     pub(super) oddities: Oddities,
 }
 
-/// Differences to keep at most: more than a SubDevice has SyncManagers.
+/// Maximum number of differences that are kept: more than a SubDevice has SyncManagers.
 const MAX_ODDITIES: usize = 32;
 
 /// Differences between a declaration and a SubDevice: each attempt finds them again, and each is reported once.
@@ -71,7 +71,7 @@ const MAX_ODDITIES: usize = 32;
 pub(super) struct Oddities(VecDeque<String>);
 
 impl Oddities {
-    /// Whether a difference is not yet reported. The oldest are forgotten.
+    /// Whether a difference is not yet reported; it is then kept. The oldest are dropped.
     pub fn is_new(&mut self, what: &str) -> bool {
         if self.0.iter().any(|other| other == what) {
             return false;

@@ -126,9 +126,9 @@ pub enum MemberFinding<'a> {
 /// What is read of a SubDevice after its scan.
 #[derive(Clone, Debug)]
 pub enum More<'a> {
-    /// Its whole SII; of some SIIs the scan reads only a part.
+    /// The whole SII; the scan reads some SIIs only in part.
     Sii(&'a SubDeviceInfo),
-    /// Words of its memory by which declarations may find it: those that it has.
+    /// Words of its memory by which declarations may find it; without words that its memory does not have.
     DataWords(Vec<DataWord>),
 }
 
@@ -189,7 +189,8 @@ pub enum Observation<'a> {
         /// The SubDevices.
         found: Rc<Found>,
     },
-    /// More was read of a scanned SubDevice. It is refused if another SubDevice has got the address since.
+    /// More data of a scanned SubDevice was read. The observation is refused if another SubDevice has got the address
+    /// since.
     MoreRead {
         /// The SubDevice at the request.
         key: SubDeviceKey,

@@ -24,7 +24,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let [text] = session.words() else { return Err(Failure::usage("'debug' needs one argument: the level!")) };
     let level = numbers::parse(text).ok_or_else(|| Failure::usage(format!("Invalid debug level '{text}'!")))?;
     for master in session.masters()? {
-        // A master that nothing drives keeps it for later.
+        // If no process drives the master, it keeps the level until one does.
         let done = session.done(master.master, ToolQuery::SetDebugLevel { level }, Vec::new());
         session.if_driven(done)?;
     }

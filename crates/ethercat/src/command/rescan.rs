@@ -19,7 +19,7 @@ pub const COMMAND: Command = Command {
 
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     for master in session.masters()? {
-        // A master that nothing drives is scanned when something does.
+        // If no process drives the master, it is scanned as soon as one does.
         let scanned = session.ask(master.master, Query::Rescan, Vec::new());
         session.if_driven(scanned)?;
     }

@@ -59,7 +59,7 @@ fn a_master_that_waits_for_its_interface_lists_none_and_says_why() {
         let done = bench.tool(&[command]);
         assert!(done.code == Some(0) && done.err.contains(why) && done.out.contains(shown), "{command}: {done:?}");
     }
-    // What shows nothing of a bus without an application, and what has no output.
+    // Commands that show nothing of a bus without an application, and commands without output.
     for command in [&["config"][..], &["domains"], &["data"], &["eoe"], &["debug", "1"], &["rescan"]] {
         let done = bench.tool(command);
         assert!(done.code == Some(0) && done.err.starts_with(why) && done.out.is_empty(), "{command:?}: {done:?}");

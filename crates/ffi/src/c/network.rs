@@ -64,7 +64,7 @@ unsafe extern "C" fn ringcat_master_load_eni_data(master: *mut ec_master_t, data
     unsafe { load(master, || Network::of_eni(Source::Memory(contents(data, size)?))) }
 }
 
-/// A file in memory; NULL is none, also without a byte.
+/// A file in memory. NULL is an error, also with a size of 0.
 ///
 /// # Safety
 /// Memory of this size, or NULL.

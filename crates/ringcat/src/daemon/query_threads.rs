@@ -1,7 +1,7 @@
 //! Threads that answer the queries which a daemon passes to the owner of a bus.
 //!
-//! So that a slow SubDevice does not keep other queries waiting, there are some of them. They hold their answers back
-//! from nothing: a full queue refuses.
+//! There are several threads, so that a slow SubDevice does not delay other queries. The queues are bounded: a query is
+//! refused if its queue is full.
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -15,16 +15,16 @@ use crate::supervisor_thread::SupervisorThread;
 
 /// Stack of each: a program may have locked its memory, and with it these.
 const STACK_BYTES: usize = 256 << 10;
-/// Threads for queries that a mailbox answers, and so queries to slow SubDevices at a time.
+/// Threads for queries that are answered by a mailbox: so many queries to slow SubDevices are possible at a time.
 const SLOW: usize = 3;
-/// Threads for all other queries: slow SubDevices do not delay those about registers and states.
+/// Threads for all other queries: slow SubDevices do not delay queries about registers and states.
 const QUICK: usize = 1;
-/// Queries that wait for a thread. The daemon has no more under way.
+/// Maximum number of queries that wait for a thread. The daemon has no more pending queries.
 const WAITING: usize = 16;
 
 type QueuedQuery = (Numbered<Query>, Vec<u8>);
 
-/// Where queries are put. The threads end when it is dropped.
+/// The queues of the threads. The threads end when it is dropped.
 #[derive(Debug)]
 pub(super) struct QueryThreads {
     slow: SyncSender<QueuedQuery>,
@@ -67,14 +67,14 @@ impl QueryThreads {
         Ok(queue)
     }
 
-    /// Takes a query, and says so.
+    /// Puts a query into its queue and confirms this to the daemon; refuses the query if the queue is full.
     pub fn take(&self, query: Numbered<Query>, bytes: Vec<u8>) {
         let (id, master) = (query.id, query.master);
         let queue = if is_quick(&query.what) { &self.quick } else { &self.slow };
         match queue.try_send((query, bytes)) {
             Ok(()) => send(&self.connection, Content::Underway { id }.into()),
             Err(_) => {
-                let what = Err(Refusal::Failed("the application answers as many queries as it can".to_owned()));
+                let what = Err(Refusal::Failed("the application has the maximum number of pending queries".to_owned()));
                 send(&self.connection, Content::Answer(Numbered { id, master, what }).into());
             }
         }

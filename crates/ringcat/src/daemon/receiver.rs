@@ -21,7 +21,7 @@ use crate::supervisor_thread::SupervisorThread;
 
 /// Stack of the thread: a program may have locked its memory, and with it this.
 const STACK_BYTES: usize = 512 << 10;
-/// Interval of checks for new events of scans, also while messages come.
+/// Interval of checks for new events of scans, also while messages arrive.
 const LOOK: Duration = Duration::from_millis(200);
 
 /// The thread that receives the messages of the daemon.

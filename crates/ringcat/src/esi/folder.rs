@@ -82,8 +82,8 @@ impl EsiFolder {
         self.read
     }
 
-    /// Paths in the folder that are left out, with the reason: links that lead nowhere, folders that may not be read or
-    /// are too deep, files beyond [`MAX_FILES`](super::MAX_FILES).
+    /// Paths in the folder that are left out, with the reason: broken links, folders that may not be read or are too
+    /// deep, files beyond [`MAX_FILES`](super::MAX_FILES).
     pub fn notices(&self) -> &[String] {
         &self.notices
     }

@@ -1,5 +1,5 @@
-//! The descriptions in a folder and in all folders below it: each file and each folder once, also if links lead to it
-//! again or in circles, in bounded time.
+//! The descriptions in a folder and in all folders below it: each file and each folder once, also if symbolic links
+//! point to it again or form circles, in bounded time.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::fs::{self, Metadata};
@@ -7,13 +7,13 @@ use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
-/// Folders below the folder, one in the other.
+/// Maximum depth of folders below the folder.
 const MAX_DEPTH: usize = 6;
-/// Files of a folder at most; the others are left out.
+/// Maximum number of files; the others are left out.
 pub const MAX_FILES: usize = 10_000;
-/// Entries of folders that are looked at; the others are left out.
+/// Maximum number of folder entries that are read; the others are left out.
 const MAX_ENTRIES: usize = 200_000;
-/// Notices that are kept.
+/// Maximum number of notices.
 const MAX_NOTICES: usize = 20;
 
 /// What is in a folder.
@@ -27,12 +27,12 @@ pub(super) struct Walked {
     entries: usize,
     /// Device and inode of the files and folders that are known.
     known: BTreeSet<(u64, u64)>,
-    /// Folders to look at, with the number of those above them: real ones first, then those behind links.
+    /// Folders to read, with their depth: real folders first, then those behind links.
     folders: VecDeque<(PathBuf, usize)>,
     links: VecDeque<(PathBuf, usize)>,
 }
 
-/// Looks at a folder and all folders below it.
+/// Reads a folder and all folders below it.
 ///
 /// # Errors
 /// The folder itself cannot be read.
@@ -52,7 +52,7 @@ pub(super) fn walk(folder: &Path) -> io::Result<Walked> {
 }
 
 impl Walked {
-    /// The next folder that is not known; those behind links when all others are.
+    /// The next folder that was not read; folders behind links come last.
     fn next(&mut self) -> Option<(PathBuf, usize)> {
         if let Some(folder) = self.folders.pop_front() {
             return Some(folder);
@@ -65,30 +65,30 @@ impl Walked {
                     }
                 }
                 Ok(metadata) => self.file(path, metadata),
-                Err(error) => self.note(format!("{}: the link leads nowhere: {error}", path.display())),
+                Err(error) => self.note(format!("{}: broken link: {error}", path.display())),
             }
         }
         None
     }
 
-    /// Notes what is in a folder, in the order of names.
+    /// Reads the entries of a folder, in the order of names.
     fn look_at(&mut self, folder: &Path, depth: usize) -> io::Result<()> {
         let mut entries = Vec::new();
         for entry in fs::read_dir(folder)? {
             self.entries += 1;
             if self.entries > MAX_ENTRIES {
-                self.note(format!("{}: only the first {MAX_ENTRIES} entries are looked at", folder.display()));
+                self.note(format!("{}: only the first {MAX_ENTRIES} entries are read", folder.display()));
                 break;
             }
             entries.push(entry?.path());
         }
         entries.sort_unstable();
         for path in entries {
-            // One that has gone meanwhile is none.
+            // Without an entry that was removed meanwhile.
             let Ok(metadata) = fs::symlink_metadata(&path) else { continue };
             let may_be_folder = metadata.is_dir() || metadata.is_symlink();
             if metadata.is_dir() && depth == MAX_DEPTH {
-                self.note(format!("{}: more than {MAX_DEPTH} folders, one in the other: left out", path.display()));
+                self.note(format!("{}: more than {MAX_DEPTH} levels of folders: left out", path.display()));
             } else if metadata.is_symlink() {
                 self.links.push_back((path, depth + 1));
             } else if !may_be_folder {
@@ -177,7 +177,7 @@ mod tests {
 
     // covers: esi-read
     #[test]
-    fn links_in_circles_lead_to_each_folder_and_file_once() {
+    fn circular_links_give_each_folder_and_file_once() {
         let place = Place::new("circles");
         place.folder("vendor/more");
         for name in ["one.xml", "vendor/two.xml", "vendor/more/three.XML", "notes.txt"] {
@@ -194,7 +194,7 @@ mod tests {
         let (files, notices) = place.walked();
         assert_eq!(files, ["one.xml", "vendor/more/three.XML", "vendor/two.xml"]);
         assert_eq!(notices.len(), 2, "{notices:?}");
-        assert!(notices.iter().all(|it| it.contains("/circle-") && it.contains("leads nowhere")), "{notices:?}");
+        assert!(notices.iter().all(|it| it.contains("/circle-") && it.contains("broken link")), "{notices:?}");
     }
 
     // covers: esi-read
@@ -209,7 +209,7 @@ mod tests {
         let (files, notices) = place.walked();
         assert_eq!(files, ["first/deep/four.xml"]);
         assert_eq!(notices.len(), 1, "{notices:?}");
-        assert!(notices[0].contains("gone.xml: the link leads nowhere: "), "{notices:?}");
+        assert!(notices[0].contains("gone.xml: broken link: "), "{notices:?}");
     }
 
     // covers: esi-read
@@ -226,7 +226,7 @@ mod tests {
         }
         let (files, notices) = place.walked();
         assert_eq!(files, ["1/2/3/4/5/6/in.xml"]);
-        assert!(notices.iter().any(|it| it.contains("6/7: more than 6 folders, one in the other")), "{notices:?}");
+        assert!(notices.iter().any(|it| it.contains("6/7: more than 6 levels of folders")), "{notices:?}");
         assert_eq!((notices.len(), notices[20].as_str()), (21, "41 more paths are left out"));
     }
 }

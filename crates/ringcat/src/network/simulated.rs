@@ -56,7 +56,7 @@ impl LoadedNetwork {
             .map_err(|error| SimulatedNetworkError::Contradiction(Box::new(error)))?;
         let own = &self.configuration.declaration.subdevices;
         for (made, own) in file.configuration.declaration.subdevices.iter_mut().zip(own) {
-            // By these it is found: alias, identification, data word.
+            // The SubDevice is found by these: alias, identification, data word.
             made.address = own.address;
             made.expected.identification = own.expected.identification;
         }

@@ -1,5 +1,5 @@
-//! An INACTIVE that waits for an ACTIVE raises an alarm if none sends process data: outputs then no longer change, or
-//! their watchdogs have expired.
+//! An INACTIVE raises an alarm if no ACTIVE sends process data: outputs then no longer change, or their watchdogs have
+//! expired.
 
 use std::time::Duration;
 
@@ -58,7 +58,7 @@ mod tests {
 
     // covers: REQ032, 9.11, standby
     #[test]
-    fn a_missing_active_is_reported_once_and_its_return_too() {
+    fn a_missing_active_and_its_return_are_each_reported_once() {
         let mut lookout = Lookout::new(at(100));
         assert_eq!(lookout.note(None, LIMIT, at(114)), None);
         assert_eq!(lookout.note(None, LIMIT, at(115)), Some(CyclicStandbyEvent::NoActive(LIMIT)), "it never came");

@@ -115,7 +115,7 @@ fn fifty_clients_at_100_hz_are_answered_beside_an_application_in_op() {
             std::thread::sleep(at.saturating_sub(begin.elapsed()));
             match client.ask(0, Query::AlStatus { position: (round % 4) as u16 }, Vec::new()) {
                 Ok((answer, _)) => assert_eq!(answer, Answer::AlStatus { status: 8, code: 0 }),
-                // The owner has had as many queries as it may have for a second.
+                // The owner has had the maximum number of pending queries for a second.
                 Err(ClientError::Refused(Refusal::TooManyQueries { .. })) => refused += 1,
                 Err(error) => panic!("{error}"),
             }

@@ -238,10 +238,10 @@ fn an_application_that_is_killed_and_started_again_at_once_reaches_op() {
     }
 }
 
-/// A client asks for events as `ethercat events` does, so that the owner gets a message every 50 ms.
+/// A client requests events as `ethercat events` does, so that the owner gets a message every 50 ms.
 // covers: daemon
 #[test]
-fn a_change_that_a_killed_owner_has_followed_is_known_although_a_client_asks() {
+fn a_change_seen_by_a_killed_owner_is_known_although_a_client_sent_queries() {
     const LEFT: usize = 3;
     let bench = Bench::start(LEFT + 1);
     let mut client = bench.client();

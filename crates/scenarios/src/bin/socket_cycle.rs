@@ -4,10 +4,10 @@
 //! The MainDevice is a process in a network namespace, `ringcat sim` is at the other end of a veth pair. A cycle is all
 //! work of the application's thread: wait for the frames, receive, evaluate, copy, work, pack, send, publish, sleep.
 //! Callgrind counts only within the function of a measured cycle, after a warm-up, so start-up and the supervisor
-//! thread are excluded. The figure is that of the batch with the fewest, of ten batches of 50 cycles: a machine that
-//! does other work makes frames late under valgrind, and late cycles take more instructions, never fewer. The mean of
-//! all is printed beside it. Valgrind does not instrument the vDSO: clock reads are counted separately, as calls. The
-//! simulated segment delays frames, so that each cycle sleeps in spite of the slow valgrind.
+//! thread are excluded. The figure is the lowest of ten batches of 50 cycles: on a machine that does other work frames
+//! are late under valgrind, and late cycles take more instructions, never fewer. The mean of all is printed beside it.
+//! Valgrind does not instrument the vDSO: clock reads are counted separately, as calls. The simulated segment delays
+//! frames, so that each cycle sleeps in spite of the slow valgrind.
 //!
 //! CPU time and memory are measured without valgrind, for the whole process with both threads and the carrier watch.
 //!
@@ -190,7 +190,8 @@ fn instructions(namespaces: &Namespaces) -> Tried<bool> {
     Ok(met)
 }
 
-/// Instructions of a cycle that is not disturbed: the batch with the fewest. Each batch has all periodic work in it.
+/// Instructions of a cycle that is not disturbed: the batch with the fewest instructions. Each batch contains all
+/// periodic work.
 fn per_cycle(profile: &Profile) -> f64 {
     let fewest = profile.parts.iter().copied().filter(|part| *part > 0).min();
     fewest.map_or(f64::NAN, |fewest| fewest as f64 / BATCH as f64)

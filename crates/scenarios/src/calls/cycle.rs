@@ -189,7 +189,7 @@ impl Ecrt {
         (0..count).for_each(|_| self.cycle());
     }
 
-    /// Some cycles of a loop that exchanges no process data, and gives no time.
+    /// Some cycles of a loop that exchanges no process data and sets no application time.
     pub fn cycles_without_time(&mut self, count: usize) {
         for _ in 0..count {
             self.receive();

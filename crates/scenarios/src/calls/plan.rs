@@ -24,7 +24,7 @@ pub struct Plan {
     pub clocks: bool,
     /// The application's time and the host's, once given.
     pub application_time: Option<(u64, u64)>,
-    /// The first one that is not 0.
+    /// The first time that is not 0.
     pub first_application_time: Option<(u64, u64)>,
     /// The selected reference clock.
     pub reference: Option<SubDeviceId>,

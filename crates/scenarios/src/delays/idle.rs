@@ -18,9 +18,9 @@ use crate::dice::Dice;
 use crate::tap::Tap;
 use crate::world::station;
 
-/// Time in which idle operation has followed a change of the cables.
+/// Time after which idle operation has certainly processed a change of the cables.
 const FOLLOWED: Duration = Duration::from_millis(2_500);
-/// Time after that in which the cables do not change.
+/// Time after [`FOLLOWED`] during which the cables do not change.
 const CALM: Duration = Duration::from_millis(500);
 
 /// Results of reports.

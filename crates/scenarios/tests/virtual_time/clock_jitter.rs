@@ -84,11 +84,12 @@ fn sync0_stays_synchronous_through_cuts_with_a_host_50_us_late() {
     }
 }
 
-/// The sender is on average 200 us late: clocks in front of the reference follow it by its estimate, and do not lock.
-/// Without SYNC signals nothing waits for them, and the others are as exact as ever; with signals they wait themselves.
+/// The sender is on average 200 us late: clocks in front of the reference follow the estimate of the host, and do not
+/// lock. Without SYNC signals no SubDevice waits for them, and the other clocks are as exact as before; with SYNC
+/// signals these SubDevices wait in SAFEOP.
 // covers: 7.2, 7.3, dc-late-host
 #[test]
-fn a_clock_without_sync_in_front_of_the_reference_holds_nothing_back() {
+fn a_clock_without_sync_in_front_of_the_reference_delays_no_subdevice() {
     for (count, reference, closed) in [(3, 1, false), (3, 1, true), (12, 1, false), (12, 5, false), (12, 5, true)] {
         for front_has_sync in [false, true] {
             let text = format!("reference {reference} of {count}, ring {closed}, SYNC in front {front_has_sync}");

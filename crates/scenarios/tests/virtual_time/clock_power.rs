@@ -37,10 +37,10 @@ fn ahead_ns(world: &World, device: usize) -> i64 {
     time.wrapping_sub(EPOCH).wrapping_sub(network.now().0) as i64
 }
 
-/// No clock remains that knows the time: the host does.
+/// No clock has kept the system time: the system time continues with the time of the host.
 // covers: 7.2, dc-reference
 #[test]
-fn the_system_time_goes_on_after_all_subdevices_have_lost_their_power() {
+fn the_system_time_continues_after_all_subdevices_have_lost_their_power() {
     for (kind, count) in SEGMENTS {
         for (off_ms, apart_ms) in [(40, 0), (400, 0), (40, 3), (40, 120)] {
             let text = format!("{kind} of {count}, {off_ms} ms without power, one each {apart_ms} ms");
@@ -57,7 +57,7 @@ fn the_system_time_goes_on_after_all_subdevices_have_lost_their_power() {
             let passed = (world.network().now().0 - begin) as i64;
             let change = ahead_ns(&world, 0) - before;
             println!("{text}: {change} ns in {} ms", passed / 1_000_000);
-            // The clocks of both drift.
+            // Both the clock and the host drift.
             let allowed = passed * 2 * DRIFT / 1_000_000 + 200_000;
             assert!(change.abs() <= allowed, "{text}: {change} ns of {allowed}");
             assert!(
@@ -84,7 +84,7 @@ fn clocks_stay_together_while_their_reference_loses_its_power() {
             let mut largest = 0;
             for _ in 0..3_000 {
                 world.cycle();
-                // A clock behind another path than before is off by the time of that path.
+                // A clock that frames reach on another path than before is off by the delay of that path.
                 largest = largest.max(ahead_ns(&world, 1).abs().max(ahead_ns(&world, count - 1).abs()));
             }
             assert!(largest <= 1_000_000, "{text}: {largest} ns from the time of the host");

@@ -183,7 +183,7 @@ fn pulses_go_on_through_a_jump_of_the_application_time_and_reach_their_phase_in_
     }
 }
 
-/// A choice counts at any time, also while delays are measured.
+/// A choice takes effect at any time, also while delays are measured.
 // covers: 7.5, dc-reference
 #[test]
 fn another_reference_is_chosen_during_the_set_up_of_the_clocks() {
@@ -201,8 +201,8 @@ fn another_reference_is_chosen_during_the_set_up_of_the_clocks() {
     }
 }
 
-/// While SubDevices wait for the lock, samples of the reference before say nothing of another one: pulses are together
-/// from the first cycle in OP on, seen from inside the SubDevices.
+/// While SubDevices wait for the lock, samples against the previous reference are not valid for another one: pulses are
+/// together from the first cycle in OP on, measured inside the SubDevices.
 // covers: 7.5, dc-reference, dc-sync
 #[test]
 fn another_reference_is_chosen_while_the_lock_is_awaited() {
@@ -347,11 +347,11 @@ fn clocks_follow_calls_and_run_free_without() {
     }
 }
 
-/// Nothing is read of the reference: it has the time that was written last. The application's time runs 300 ppm faster
-/// than the host's, and jumps in the end.
+/// The reference is not read: it has the time that was written last. The application's time runs 300 ppm faster than
+/// the host's, and jumps in the end.
 // covers: 7.4, dc-reference
 #[test]
-fn a_reference_that_alone_is_called_for_follows_a_time_that_drifts() {
+fn a_reference_that_alone_is_steered_follows_a_time_that_drifts() {
     for (kind, count) in SEGMENTS.into_iter().take(4) {
         let mut world = world(48, network(kind, count), config());
         world.application_mut().exchange_mut().set_clock_datagrams(ClockDatagrams::Called);
@@ -422,10 +422,10 @@ fn unlocked_clocks_are_a_warning_after_5_s_or_a_stay_in_safeop() {
     }
 }
 
-/// The clock that is too far has SYNC signals itself: it waits once, and is reported once.
+/// The SubDevice whose clock is too far off has SYNC signals itself: it waits once, and is reported once.
 // covers: 7.3, dc-sync
 #[test]
-fn an_unlocked_clock_with_signals_of_its_own_goes_on_after_5_s_with_one_warning() {
+fn a_subdevice_with_an_unlocked_clock_continues_after_5_s_with_one_warning() {
     let mut descriptions = clocked(4, 50);
     descriptions[3].clock_drift_ppb = 900_000;
     let mut world = World::with(47, wired_as("line", descriptions), &Options::default(), |scan| {

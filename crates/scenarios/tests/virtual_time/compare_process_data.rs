@@ -235,7 +235,7 @@ fn a_syncmanager_that_an_eni_does_not_write_prevents_op() {
 
 // covers: network-file, eni-run
 #[test]
-fn a_terminal_without_a_processor_takes_process_data_of_any_length() {
+fn a_terminal_without_a_processor_accepts_process_data_of_any_length() {
     let bus = "coupler emulated-output-8";
     let file = file_of(bus, |file| {
         let entries = file.subdevice[1].sync_manager[0].pdo[0].entries.as_mut().expect("the scan has them");

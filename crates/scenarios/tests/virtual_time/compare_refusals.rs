@@ -143,7 +143,7 @@ fn a_reference_without_a_clock_is_named_and_another_one_reported() {
 /// The network has no clock, and no SubDevice needs one.
 // covers: network-file, dc-reference
 #[test]
-fn clocks_of_a_network_without_any_are_named() {
+fn declared_clocks_of_a_network_without_clocks_are_reported() {
     let device = |kind: &str| format!("[[device]]\ntype = \"{kind}\"\nclock_bits = 0\n");
     let bus = &(device("coupler") + &device("digital-output-8"));
     let clocks = |file: &mut NetworkFile| file.clocks = Some(Clocks::default());
@@ -153,10 +153,10 @@ fn clocks_of_a_network_without_any_are_named() {
     assert_eq!(checked(&file_of(bus, |_| ()), bus), []);
 }
 
-/// A run refuses it on two interfaces, and splits it on request.
+/// A run refuses the LRW on two interfaces, and splits it on request.
 // covers: network-file, eni-run
 #[test]
-fn an_lrw_over_several_subdevices_is_named_on_two_interfaces() {
+fn an_lrw_over_several_subdevices_is_reported_on_two_interfaces() {
     let ring = format!("[segment]\nring = true\n{LINE}");
     let network = file_of(LINE, |_| ());
     let options = ExportOptions::default().with_lrw(LrwUse::Always);
@@ -382,10 +382,10 @@ fn an_eni_of_a_file_without_revisions_and_identities_has_no_difference() {
     }
 }
 
-/// The description of modules is not in an SII; that the ENI has no SyncManager is a difference nevertheless.
+/// An SII does not describe modules; a SyncManager that is missing in the ENI is a difference nevertheless.
 // covers: network-file, eni-run, ES-69
 #[test]
-fn process_data_that_an_eni_does_not_have_of_a_subdevice_with_modules_is_named() {
+fn process_data_of_modules_that_is_missing_in_an_eni_is_reported() {
     let bus = with_modules("\"0x00010001\"");
     for (left, names) in [(0, &[2, 3][..]), (1, &[3])] {
         let network = file_of(&bus, |file| {
@@ -411,7 +411,7 @@ fn process_data_that_an_eni_does_not_have_of_a_subdevice_with_modules_is_named()
 
 // covers: network-file, dc-sync, ES-60
 #[test]
-fn sync_signals_of_none_of_its_modes_and_a_cycle_of_0_prevent_op() {
+fn sync_signals_that_no_mode_has_and_a_cycle_of_0_prevent_op() {
     let none = |word: &str| {
         format!(
             "position 2 \"servo\": AssignActivate {word} activates SYNC signals of none of its modes (0x0000, 0x0300, \

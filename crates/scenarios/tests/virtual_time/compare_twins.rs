@@ -21,7 +21,7 @@ const PERIOD: Duration = Duration::from_millis(1);
 /// Address of a data word that no SII names.
 const WORD: u16 = 0x1000;
 
-/// What tells SubDevices apart.
+/// Kind of identifier of a SubDevice.
 #[derive(Clone, Copy, Debug)]
 enum Kind {
     Alias,
@@ -60,7 +60,7 @@ impl Kind {
     }
 }
 
-/// Devices of these types; those of a type with `=` behind it have this mark.
+/// Devices of these types; devices of a type with `=` behind it have this identifier.
 fn devices(types: &[&str], kind: Kind) -> Vec<DeviceDescription> {
     let (names, values): (Vec<&str>, Vec<Option<u16>>) = types
         .iter()
@@ -119,7 +119,7 @@ const BUS: [&str; 3] = ["coupler", "servo=7", "digital-output-8"];
 
 // covers: network-file
 #[test]
-fn twins_of_a_declared_subdevice_prevent_op_and_both_are_named() {
+fn duplicates_of_a_declared_subdevice_prevent_op_and_both_are_reported() {
     for kind in KINDS {
         let network = file_of(&BUS, kind, |file| kind.declare(&mut file.subdevice[1], 7));
         assert_eq!(short(&checked(&network, &BUS, kind)), [], "{kind:?}");
@@ -129,7 +129,7 @@ fn twins_of_a_declared_subdevice_prevent_op_and_both_are_named() {
         let expected =
             format!("\"{}\": {} belongs to position 1 and to position 3", network.file.subdevice[1].name, kind.words());
         assert_eq!(found[1].text, expected);
-        // The twin is another device, which is declared itself: nothing is additional.
+        // The duplicate is another device, which is declared itself: no SubDevice is additional.
         let other = ["coupler", "servo=7", "digital-output-8=7"];
         assert_eq!(short(&checked(&network, &other, kind)), [(Ambiguous, true, Some(1))], "{kind:?}");
     }
@@ -137,7 +137,7 @@ fn twins_of_a_declared_subdevice_prevent_op_and_both_are_named() {
 
 // covers: network-file
 #[test]
-fn the_declared_device_is_compared_and_not_its_twin() {
+fn the_declared_device_is_compared_and_not_its_duplicate() {
     let bus = ["coupler", "digital-output-8", "servo=7"];
     for kind in KINDS {
         let network = file_of(&bus, kind, |file| kind.declare(&mut file.subdevice[2], 7));
@@ -148,7 +148,7 @@ fn the_declared_device_is_compared_and_not_its_twin() {
 
 // covers: network-file, hot-connect
 #[test]
-fn twins_of_a_group_leave_it_absent_and_are_named_once() {
+fn duplicates_of_a_group_head_leave_the_group_absent_and_are_reported_once() {
     let bus = ["coupler", "digital-output-8", "servo=7", "digital-input-8"];
     let grouped = |kind: Kind, required: Required| {
         file_of(&bus, kind, move |file| {
@@ -176,7 +176,7 @@ fn twins_of_a_group_leave_it_absent_and_are_named_once() {
     }
 }
 
-/// A bus of up to six devices, some of which have a mark of 1 or 2.
+/// A bus of up to six devices, some of which have an identifier of 1 or 2.
 fn random_bus(dice: &mut Dice) -> Vec<String> {
     const TYPES: [&str; 3] = ["digital-output-8", "digital-input-8", "servo"];
     let device = |dice: &mut Dice| {
@@ -189,7 +189,7 @@ fn random_bus(dice: &mut Dice) -> Vec<String> {
     std::iter::once("coupler".to_owned()).chain((0..=dice.below(5)).map(|_| device(dice))).collect()
 }
 
-/// Declares marked SubDevices by their marks, some as heads of groups, some as optional.
+/// Declares SubDevices with an identifier by it, some as heads of groups, some as optional.
 fn random_file(file: &mut NetworkFile, bus: &[String], kind: Kind, dice: &mut Dice) {
     let mut group: Option<String> = None;
     for (at, (subdevice, device)) in file.subdevice.iter_mut().zip(bus).enumerate() {
@@ -210,7 +210,7 @@ fn random_file(file: &mut NetworkFile, bus: &[String], kind: Kind, dice: &mut Di
 
 // covers: network-file, hot-connect
 #[test]
-fn random_twins_are_marked_as_the_activation_decides() {
+fn random_duplicates_are_marked_as_the_activation_decides() {
     let (seeds, mut with_twins) = (from_environment().unwrap_or(0..60), 0);
     for seed in seeds.clone() {
         let mut dice = Dice::new(seed);
@@ -227,7 +227,7 @@ fn random_twins_are_marked_as_the_activation_decides() {
         }
         let types: Vec<&str> = declared.iter().map(String::as_str).collect();
         let change = |file: &mut NetworkFile| random_file(file, &declared, kind, &mut dice);
-        // Files with a mark twice are refused.
+        // Files that declare an identifier twice are refused.
         let Ok(network) = read(&types, kind, change) else { continue };
         println!("seed {seed}: file {declared:?}, bus {bus:?}, {kind:?}\n{}", network.file.to_text());
         let differences = checked(&network, &bus.iter().map(String::as_str).collect::<Vec<&str>>(), kind);

@@ -13,12 +13,12 @@ use scenarios::world::{CYCLE, World};
 
 use crate::hot_connect::{LIMIT, infos};
 
-/// The word, in process RAM.
+/// Address of the word, in process data RAM.
 const WORD: RegisterAddress = RegisterAddress(0x1000);
 const BASE: [&str; 2] = ["coupler", "digital-output-8"];
 const TWIN: &str = "digital-output-16";
 
-/// The base, with twins behind its first SubDevice that differ by the word only.
+/// The base, and behind its first SubDevice two equal SubDevices that differ by the word only.
 fn devices(words: [u16; 2]) -> Vec<DeviceDescription> {
     let mut devices = descriptions(&[BASE[0], TWIN, TWIN, BASE[1]]);
     for (device, word) in devices[1..3].iter_mut().zip(words) {
@@ -55,7 +55,7 @@ fn places(world: &World) -> Vec<Option<usize>> {
 
 // covers: 4.3, 8.2, hot-connect
 #[test]
-fn twins_are_told_apart_by_a_word_that_their_sii_does_not_name() {
+fn equal_subdevices_are_identified_by_a_word_that_their_sii_does_not_name() {
     for (words, expected) in [([7, 8], [0, 3, 1, 2]), ([8, 7], [0, 3, 2, 1])] {
         let mut world = world(words);
         world.settle();
@@ -80,12 +80,12 @@ fn twins_are_told_apart_by_a_word_that_their_sii_does_not_name() {
 
 // covers: 4.3, 8.2, hot-connect
 #[test]
-fn twins_with_the_same_word_are_ambiguous_and_another_word_finds_none() {
+fn equal_subdevices_with_one_word_are_ambiguous_and_another_word_finds_none() {
     for (words, present) in [([7, 7], 0), ([7, 9], 1)] {
         let network = line(devices(words), NetworkOptions::default());
         let mut main_device = MainDevice::request(Tap::new(network), &Options::default());
         let mut scan = main_device.scan().expect("a scan");
-        assert!(scan.subdevices.iter().all(|info| info.data_words.is_empty()), "nothing has asked for a word");
+        assert!(scan.subdevices.iter().all(|info| info.data_words.is_empty()), "no declaration needs a word");
         let mut declaration = declare(&scan);
         main_device.read_data_words(&declaration.subdevices, &mut scan);
         let read: Vec<Option<u16>> = scan.subdevices.iter().map(|info| info.data_word(WORD)).collect();

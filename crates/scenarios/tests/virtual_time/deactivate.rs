@@ -19,7 +19,7 @@ use scenarios::witness::Witness;
 use scenarios::world::CYCLE;
 
 const LIMIT: Duration = Duration::from_secs(1);
-/// Beside the state changes with clocks, which are known; that they lock is not awaited.
+/// Beside the state changes with clocks, which are known; the lock of the clocks is not awaited.
 const WITH_CLOCKS: Duration = Duration::from_millis(15);
 /// Two with a mailbox, two with device emulation, two with neither.
 const MIXED: [&str; 6] =
@@ -253,11 +253,11 @@ fn a_failed_configuration_waits_for_a_request_with_that_policy() {
     }
 }
 
-/// As when a bus is handed over: a SubDevice that refuses a state because it is not in the one before is configured
-/// once more. Judged by the states inside the SubDevices.
+/// As when a bus is handed over: a SubDevice that refuses a state because it is not in the preceding one is configured
+/// again. Evaluated by the states inside the SubDevices.
 // covers: stop, refused-states
 #[test]
-fn a_late_request_of_another_program_ends_no_configuration() {
+fn a_late_request_of_another_program_does_not_end_a_configuration() {
     const FAST: Duration = Duration::from_micros(100);
     for state in [AlState::Init, AlState::PreOp] {
         let mut refused = 0;
@@ -367,7 +367,7 @@ fn a_deactivation_keeps_its_limit_when_the_host_cable_is_cut_during_it() {
     }
 }
 
-/// It has refused PREOP before, and waits for a request with that policy.
+/// The SubDevice has refused PREOP before, and with this policy waits for a request.
 // covers: stop
 #[test]
 fn a_subdevice_that_refuses_preop_does_not_make_a_deactivation_last_its_limit() {
@@ -441,7 +441,7 @@ fn closed(network: &Network) -> usize {
 /// A SubDevice hangs while it is brought to PREOP, and then no frame returns.
 // covers: stop
 #[test]
-fn a_deactivation_that_no_frame_confirms_is_no_success() {
+fn a_deactivation_succeeds_only_if_frames_confirm_it() {
     const SHORT: Duration = Duration::from_millis(100);
     for after in (0..60).map(|half| Duration::from_micros(500 * half)) {
         for network in networks() {

@@ -1,5 +1,5 @@
-//! Deactivation at each moment of an activation, in steps of a fraction of a state change: judged inside the SubDevices
-//! when it returns (protocol 3.4, 5.3).
+//! Deactivation at each moment of an activation, in steps of a fraction of a state change: evaluated by the states
+//! inside the SubDevices when it returns (protocol 3.4, 5.3).
 
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ use scenarios::tap::Tap;
 const STEP: Duration = Duration::from_micros(100);
 const LIMIT: Duration = Duration::from_secs(1);
 const KINDS: [&str; 3] = ["servo", "digital-output-8", "emulated-output-8"];
-/// A SubDevice needs this long for a state: longer than all that a configuration does before and after.
+/// Time that a SubDevice needs for a state: longer than all other steps of a configuration.
 const SLOW: Duration = Duration::from_millis(30);
 
 fn networks(slow: bool) -> [Network; 2] {
@@ -41,15 +41,15 @@ fn ended(network: Network, with_idle: bool, declared: &[usize], ran: usize) -> V
     let mut ended = application.deactivate(LastOutputs::Held, LIMIT).expect("all follow");
     let network = ended.links_mut().network();
     let found = (0..KINDS.len()).map(|at| is_idle(network, at)).collect();
-    // What was requested before takes effect in this time.
+    // Earlier requests take effect within this time.
     ended.attend(SLOW);
     let states = ended.links_mut().network().devices().map(|device| device.al_status());
     assert!(states.eq([AlStatus::new(AlState::PreOp); KINDS.len()]), "idle {with_idle}, {declared:?}, {ran} cycles");
     found
 }
 
-/// A SubDevice executes the request of a procedure that the activation, or its end, has cut, and reads the next one
-/// only afterwards.
+/// A SubDevice executes the request of a procedure that the activation, or its end, has interrupted, and reads the next
+/// request only afterwards.
 // covers: stop, 5.3
 #[test]
 fn all_are_in_preop_when_a_deactivation_returns_at_each_moment_of_a_start() {

@@ -243,10 +243,10 @@ fn emergencies_are_kept_by_position_and_wait_in_an_undeclared_subdevice() {
     assert!(application.all_settled() && by_position.is_empty());
 }
 
-/// With idle operation, one device after the other; behind one without power, positions change in a ring.
+/// With idle operation, one device after the other; in a ring, positions change behind a device without power.
 // covers: 6.3, sdo-information
 #[test]
-fn emergencies_of_a_position_go_on_after_a_power_cycle_without_a_declaration() {
+fn emergencies_of_a_position_continue_after_a_power_cycle_without_a_declaration() {
     const AT: [u16; 2] = [1, 3];
     let kinds = ["coupler", "all-protocols", "digital-input-8", "all-protocols"];
     for off in AT.map(|at| DeviceIndex(at.into())) {

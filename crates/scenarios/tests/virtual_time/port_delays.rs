@@ -91,7 +91,7 @@ fn a_change_that_only_a_port_report_sees_is_followed() {
     }
 }
 
-/// The frames take another path than the last scan has found: the report has no delay rather than a wrong one.
+/// The frames take another path than in the last scan: the report has no delay rather than a wrong one.
 // covers: registers
 #[test]
 fn a_report_while_a_change_is_followed_has_no_delays() {

@@ -182,7 +182,8 @@ fn an_application_ends_with_its_role_and_another_one_begins_when_it_is_active_ag
     }
 }
 
-/// The role ends a deactivation that waits for a SubDevice: idle operation goes on when it is ACTIVE again.
+/// A change of the role ends a deactivation that waits for a SubDevice: idle operation continues when the MainDevice is
+/// ACTIVE again.
 // covers: 9.11, stop
 #[test]
 fn changes_are_followed_after_a_deactivation_that_the_role_has_ended() {

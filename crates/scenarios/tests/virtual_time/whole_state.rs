@@ -15,7 +15,7 @@ use scenarios::world::{CYCLE, World};
 const KINDS: [&str; 4] = ["coupler", "digital-input-8", "all-protocols", "digital-output-8"];
 /// Events that the engine keeps.
 const KEPT: usize = 4096;
-/// Events of the cyclic half that wait until they are asked for.
+/// Maximum number of events of the cyclic half that wait until they are requested.
 const QUEUE: u64 = 1024;
 
 fn world(seed: u64) -> World {
@@ -159,8 +159,8 @@ fn numbers_of_events_go_on_after_a_stop_and_a_new_scan() {
 }
 
 /// Runs an application that fetches no event, with cycles whose frames are lost: each is an event, and so is the next
-/// one that returns. The number of the first of these events, and their count; `asked` gets all that a client has read
-/// that asks after so many cycles.
+/// cycle whose frame returns. Returns the number of the first of these events, and their count; `asked` gets the events
+/// that a client reads every `ask` cycles.
 fn disturbed(cycles: u64, ask: u64, asked: &mut Vec<EventsSince>) -> (Application<Tap>, u64, u64) {
     let network = ring(descriptions(&KINDS), NetworkOptions::default());
     let mut main_device = MainDevice::request(Tap::new(network), &Options::default());
@@ -201,10 +201,10 @@ fn a_client_gets_each_event_of_a_cycle_although_the_application_fetches_none() {
 
 // covers: jobs
 #[test]
-fn each_event_of_a_cycle_has_a_number_although_none_asks_for_it() {
+fn each_event_of_a_cycle_has_a_number_without_a_request_for_it() {
     for cycles in [400, 3_000, 12_000] {
         let (mut application, number, raised) = disturbed(cycles, u64::MAX, &mut Vec::new());
-        // What is not among the events was missed.
+        // Events that are not in the result were missed.
         let since = application.engine_mut().events_since(number);
         assert!(since.next - number >= raised, "{} numbers for {raised} events", since.next - number);
         assert_eq!(since.events.len() as u64 + since.missed, since.next - number);

@@ -53,7 +53,7 @@ pub struct ControllerConfig {
     /// that arrived there before the latching frame reaches the processing unit, or of the next frame if none has
     /// arrived yet (protocol 7.1).
     pub latches_any_frame: bool,
-    /// A word of the memory that holds a value from power-on: address and value.
+    /// A word of the memory that has a value from power-on: address and value.
     pub data_word: Option<(u16, u16)>,
 }
 

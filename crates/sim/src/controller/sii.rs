@@ -241,7 +241,7 @@ impl Controller {
         self.refresh_dl_status();
     }
 
-    /// The application sets its word of the memory, once the memory exists.
+    /// The application writes its data word to the memory, once the memory exists.
     pub fn set_data_word(&mut self) {
         if let Some((address, value)) = self.config.data_word.filter(|_| self.memory.process_ram_open) {
             self.memory.store(address.into(), &value.to_le_bytes());

@@ -46,13 +46,13 @@ pub(super) fn dictionary(element: Element<'_>) -> Result<Dictionary, EsiError> {
     Ok(dictionary)
 }
 
-/// Notes types that nothing describes, each once, and subindices that a type has twice (protocol ES-20).
+/// Adds a notice for each undefined type, once, and for each subindex that a type has twice (protocol ES-20).
 fn note_types(element: Element<'_>, dictionary: &Dictionary) {
     let mut unknown: HashSet<&str> = HashSet::new();
     let look_up = |line: u32, name: &str, is_new: bool| {
         let is_known = name.is_empty() || code_of(name).is_some() || dictionary.data_type(name).is_some();
         if !is_known && is_new {
-            element.note_at(line, format!("the type {} is not described: the size counts", shown(name)));
+            element.note_at(line, format!("the type {} is not defined: its size is used", shown(name)));
         }
     };
     for object in &dictionary.objects {
@@ -66,7 +66,7 @@ fn note_types(element: Element<'_>, dictionary: &Dictionary) {
         let mut known = HashSet::new();
         let twice = of.sub_items.iter().filter_map(|item| item.sub_index).find(|number| !known.insert(*number));
         if let Some(number) = twice {
-            let text = format!("DataType {}: SubIdx {number} is there twice, the first counts", shown(&of.name));
+            let text = format!("DataType {}: SubIdx {number} is defined twice, the first one is used", shown(&of.name));
             element.note_at(of.line, text);
         }
     }

@@ -14,9 +14,9 @@ use crate::pdo_list::PdoList;
 
 /// Start-up commands with those that assign and map PDOs.
 pub(super) struct Placed {
-    /// Those of the file and those of the tables, in the order of the ENI.
+    /// Commands of the file and commands of the tables, in the order of the ENI.
     pub(super) startup: Vec<StartupCommand>,
-    /// The places of those of the tables.
+    /// Where the commands of the tables are.
     of_tables: Range<usize>,
     /// Whether the order is the one in which the engine sends them.
     pub(super) is_exact: bool,
@@ -53,7 +53,7 @@ impl Placed {
     pub(super) fn undone(&self, declared: &[DeclaredSyncManager]) -> Option<Undone> {
         let mut objects: BTreeMap<u16, (PdoList, bool)> = BTreeMap::new();
         let sent = |transition| self.startup.iter().enumerate().filter(move |(_, it)| it.transition == transition);
-        // Without commands of tables, those behind the PDOs keep their mark.
+        // Without commands of tables, commands with `after_pdos` keep this setting.
         let (after, at_ps): (Vec<_>, Vec<_>) = sent(Transition::Ps).partition(|(_, it)| it.is_after_pdos());
         for (place, command) in sent(Transition::Ip).chain(at_ps).chain(after) {
             let StartupAction::Sdo(download) = &command.action else { continue };

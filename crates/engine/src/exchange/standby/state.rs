@@ -42,7 +42,7 @@ pub struct StandbySetup {
 pub(in crate::exchange) enum Offers {
     /// The role may be offered.
     Possible,
-    /// The role is no longer offered: the application ends, and afterwards stops the SubDevices as ACTIVE.
+    /// The role is no longer offered: the application ends, and then the MainDevice stops the SubDevices as ACTIVE.
     Ended,
 }
 

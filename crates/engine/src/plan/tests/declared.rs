@@ -57,7 +57,7 @@ fn declared_sync_managers_replace_the_sii_without_assignments() {
 
 // covers: sync-managers-declared
 #[test]
-fn a_file_with_the_places_of_the_sii_differs_in_nothing() {
+fn a_file_with_the_addresses_of_the_sii_gives_no_warning() {
     let same = with(|declared| {
         for (sm, (start, length)) in declared.iter_mut().zip([(0x1180, 6), (0x1080, 0x80), (0x1000, 0x80), (0x1100, 4)])
         {

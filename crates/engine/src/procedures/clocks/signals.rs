@@ -19,7 +19,7 @@ use crate::supervisor::{Bus, BusError};
 const AHEAD_NS: u64 = 100_000_000;
 /// Largest difference of the clock at which signals are started (protocol 7.2: as IgH does).
 const GOOD_ENOUGH_NS: u32 = 10_000;
-/// Maximum wait for the first time of an application whose time begins the grid of the pulses.
+/// Maximum wait for the first application time, if the grid of the pulses begins with it.
 const GIVEN_LIMIT: Duration = Duration::from_secs(1);
 /// Maximum wait for the measurement of a segment that changes repeatedly.
 const MEASURING_LIMIT: Duration = Duration::from_secs(1);
@@ -64,8 +64,8 @@ fn clock_of(segment: &SharedSegment, member: usize) -> Option<StationAddress> {
     segment.view().clocks().of_member(member).map(|node| node.station)
 }
 
-/// Programs the SYNC unit and starts it. The clock must be approximately right by then; true if the SubDevice goes on
-/// although it is not. Then the time limit of the lock counts.
+/// Programs the SYNC unit and starts it. Before, it waits until the clock is approximately right. True if the SubDevice
+/// continues with a clock that is not; then the wait ends at the time limit of the lock at the latest.
 pub(in crate::procedures) async fn start_signals(
     bus: &Bus,
     segment: &SharedSegment,
@@ -107,8 +107,8 @@ pub(in crate::procedures) async fn start_signals(
     Ok(goes_on)
 }
 
-/// Waits for the first time of the application if the grid of the pulses begins with it: signals that are started
-/// before and after it would have different grids.
+/// Waits for the first application time if the grid of the pulses begins with it: signals that start before this time
+/// is set would have another grid than later ones.
 async fn until_time_is_given(bus: &Bus, segment: &SharedSegment) {
     let until = bus.now() + GIVEN_LIMIT;
     let begins_with_it = segment.view().clocks().config.pulse_grid == PulseGrid::FirstApplicationTime;
@@ -134,7 +134,7 @@ fn grid_ns(segment: &SharedSegment, cycle: u64) -> i64 {
 }
 
 /// What follows from clocks that are not locked in time: the model decides whether the member goes on, and reports it.
-/// True if it goes on without.
+/// True if it continues without a locked clock.
 fn or_go_on(
     segment: &SharedSegment,
     (member, attempt): (usize, u32),
@@ -165,7 +165,7 @@ async fn wait_until_about_right(
     wait(bus, segment, limit, check).await
 }
 
-/// Waits until all clocks that are required are locked, or until the SubDevice goes on without.
+/// Waits until all required clocks are locked, or until the SubDevice continues without them.
 pub(in crate::procedures) async fn wait_for_lock(
     bus: &Bus,
     segment: &SharedSegment,

@@ -16,7 +16,7 @@ const LIMIT: Duration = Duration::from_secs(5);
 
 /// Carries out work that closes ports for a moment; it is completed also if the caller no longer waits. Broadcasts
 /// pause meanwhile: fewer SubDevices would answer them. `None` if it cannot be done now, or if an application or a
-/// requested scan begins meanwhile: the work ends then, and what begins restores the ports.
+/// requested scan begins meanwhile: then the work ends, and the application or the scan restores the ports.
 pub(crate) async fn without_watch<T: 'static>(
     bus: &Bus,
     segment: &SharedSegment,

@@ -1,7 +1,7 @@
 //! The ports of all SubDevices, compared with the last scan, after work that has closed ports or read their states.
 //!
-//! Reading DL status clears the ECAT event of the ports, with which a broadcast shows a change: what has read it must
-//! see to it that a change is followed.
+//! Reading DL status clears the ECAT event by which a broadcast shows a change of ports: a procedure that reads it must
+//! ensure that idle operation follows the change.
 
 use alloc::vec::Vec;
 
@@ -24,7 +24,7 @@ pub(crate) async fn are_ports_as_scanned(bus: &Bus, segment: &SharedSegment, sca
     })
 }
 
-/// As [`are_ports_as_scanned`], for a scan: with an error it repeats itself.
+/// As [`are_ports_as_scanned`], for a scan, which is repeated after an error.
 pub(super) async fn compare_ports(bus: &Bus, segment: &SharedSegment, scanned: &Scanned) -> Result<bool, BusError> {
     let is_same = are_same(bus, scanned).await?;
     follow_ports(segment, is_same);

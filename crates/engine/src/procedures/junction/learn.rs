@@ -124,7 +124,7 @@ pub(super) fn first_behind_break(nodes: &[NodeStatus], topology: &Topology, clos
     Some(first.far.node).filter(is_open)
 }
 
-/// What was seen while ports were closed.
+/// Result of a test with closed ports.
 pub(super) enum WithClosed {
     /// Which SubDevices answered, by position.
     Answers(Vec<bool>),

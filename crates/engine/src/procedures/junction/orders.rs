@@ -25,7 +25,7 @@ impl Drop for UnderWay {
 
 /// Registers that bytes are about to be written from a register on, until the returned value is dropped. `None` if the
 /// write does not concern lasting settings of ports. A measurement that changes ports may begin while the write is
-/// under way: so it counts also where nothing follows the ports yet.
+/// under way: so the write is registered even if no procedure observes these ports yet.
 pub(crate) fn ordering(
     segment: &SharedSegment,
     station: StationAddress,

@@ -6,8 +6,8 @@
 //! only one end has communication there is no cable between the two. If neither has, the closing cable may be broken;
 //! such a ring is accepted without a test.
 //!
-//! A segment that changes during the test gives no result: it is tested again. So is a negative result, which counts
-//! if the next test has the same.
+//! If the segment changes during the test, the test has no result and is repeated. A negative result is valid only if
+//! the next test confirms it.
 
 use alloc::vec::Vec;
 use core::time::Duration;
@@ -22,14 +22,14 @@ use crate::procedures::shared_segment::SharedSegment;
 use crate::supervisor::Bus;
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 
-/// Tests of a segment that changes during each.
+/// Maximum number of tests, if the segment changes during each.
 const TESTS: usize = 5;
 /// Scans until all SubDevices answer, and until all ports are open again.
 const SCANS: u8 = 5;
 const PAUSE: Duration = Duration::from_millis(2);
 /// Pause before another test where SubDevices did not answer.
 const BETWEEN: Duration = Duration::from_millis(50);
-/// No further test begins after this time.
+/// After this time no further test begins.
 const LIMIT: Duration = Duration::from_secs(5);
 
 /// Result of a test of connections.
@@ -37,7 +37,7 @@ const LIMIT: Duration = Duration::from_secs(5);
 pub(crate) enum Refuted {
     /// All closing cables are where they were declared, or broken.
     None,
-    /// The closing cable with this number is not, and the evidence.
+    /// The closing cable with this number is not where it was declared, with the evidence.
     Closing(usize, ClosingEvidence),
     /// The segment changed during each test or did not answer, or a scan or an application has begun.
     NotTested,

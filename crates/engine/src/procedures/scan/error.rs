@@ -31,7 +31,7 @@ pub enum ScanError {
         /// At the end.
         after: LinkCounts,
     },
-    /// What another process knew of the segment was compared with it, and differed again after each scan.
+    /// The knowledge of another process was compared with the segment, and differed again after each scan.
     Unstable {
         /// Number of scans.
         scans: u32,
@@ -78,7 +78,7 @@ impl fmt::Display for ScanError {
                 let within = within.as_millis();
                 write!(
                     f,
-                    "the segment differs again after each of {scans} scans within {within} ms: a cable may flicker"
+                    "the segment differs again after each of {scans} scans within {within} ms: a cable may be loose"
                 )
             }
             ScanError::FrameLimit(limit) => limit.fmt(f),

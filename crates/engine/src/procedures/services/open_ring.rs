@@ -16,7 +16,7 @@ use crate::segment::Segment;
 use crate::supervisor::Bus;
 
 /// Maximum wait until an opened ring of two links whose ports are open again is seen closed: broadcasts pause
-/// meanwhile, and a ring that broke has to be noticed soon.
+/// meanwhile, and a break of the ring has to be detected soon.
 const CLOSING: Duration = Duration::from_millis(50);
 
 /// Rings that are opened.

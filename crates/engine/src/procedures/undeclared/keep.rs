@@ -11,8 +11,8 @@ pub(crate) async fn keep(bus: Bus, segment: SharedSegment) {
     }
 }
 
-/// Has attempts begun as they fall due, until all SubDevices are in their requested states or wait for a request. True
-/// if they are in their states.
+/// Starts attempts when they are due, until all SubDevices are in their requested states or wait for a request. True if
+/// all are in their requested states.
 pub(crate) async fn settle(bus: &Bus, segment: &SharedSegment) -> bool {
     while !segment.view().are_attempts_ended() {
         begin_due(bus, segment).await;

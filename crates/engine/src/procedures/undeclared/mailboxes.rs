@@ -44,9 +44,9 @@ impl UndeclaredMailboxes {
     }
 
     /// The SubDevices with mailboxes from now on. Mailboxes of those that stay do not change, the others are closed:
-    /// the result has those with downloads to PDO assignment or mapping that were not fetched. Emergencies follow a
-    /// SubDevice to its new position; those of one that has left go on with the next one at its position, as after a
-    /// loss of power.
+    /// the result has those with downloads to PDO assignment or mapping that were not fetched. The ring buffer for
+    /// emergencies follows a SubDevice to its new position; after a SubDevice has left, for example by a loss of power,
+    /// the next SubDevice at its position uses its ring buffer.
     pub(crate) fn follow(&self, now: &[(SubDeviceKey, Position)]) -> Vec<SubDeviceKey> {
         let (mut all, mut rings) = (self.all.borrow_mut(), self.rings.borrow_mut());
         let is_same =

@@ -114,7 +114,7 @@ impl Clocks {
         self.running().is_some()
     }
 
-    /// Whether all clocks that are required have reached the window.
+    /// Whether all required clocks have reached the window.
     pub fn are_locked(&self) -> bool {
         self.running().is_some_and(|running| matches!(running.lock, Lock::Locked(_)))
     }
@@ -183,15 +183,15 @@ impl Clocks {
         self.nodes.iter().any(|node| node.has_clock)
     }
 
-    /// Whether a clock that is required is outside its window, or has been inside for too short a time.
+    /// Whether a required clock is outside its window, or has been inside for too short a time.
     pub fn is_any_outside(&self) -> bool {
         let samples = self.config.lock_samples;
         self.nodes.iter().any(|node| self.is_required(node) && node.good < samples)
     }
 
-    /// Whether operation needs its lock: it answers, and has SYNC signals or follows the reference. A clock without
-    /// signals in front of the reference receives the host's estimate of the time: it never locks where the host sends
-    /// milliseconds late, and its time moves nothing.
+    /// Whether OP requires that the clock is locked: it answers, and has SYNC signals or follows the reference. A clock
+    /// without SYNC signals in front of the reference receives the host's estimate of the time: it never locks if the
+    /// host sends hundreds of microseconds late, and its time controls nothing.
     pub fn is_required(&self, node: &Node) -> bool {
         node.has_clock && node.link.is_some() && (node.is_configured || !self.is_in_front(node))
     }
@@ -302,8 +302,8 @@ impl Clocks {
         preferred.or_else(|| candidates().next()).map(|node| node.station)
     }
 
-    /// Makes a clock the reference, or none. Clocks that were not all locked are not near each other: samples against
-    /// another reference, which was in its own window, say nothing of this one.
+    /// Makes a clock the reference, or none. If not all clocks were locked, they are not near each other: samples
+    /// against another reference are not valid for this one.
     pub(in crate::segment) fn refer_to(&mut self, reference: Option<StationAddress>) {
         let is_other = core::mem::replace(&mut self.reference, reference) != reference;
         if is_other && self.is_any_outside() {
@@ -361,7 +361,7 @@ impl Clocks {
         Some((self.reference_on(link)?, in_front.collect()))
     }
 
-    /// Whether frames pass it before the reference of its link.
+    /// Whether frames pass the clock before the reference of its link.
     fn is_in_front(&self, node: &Node) -> bool {
         let reference = node.link.and_then(|link| self.reference_on(link));
         reference.is_some_and(|reference| node.unit.is_some() && node.unit < reference.unit)

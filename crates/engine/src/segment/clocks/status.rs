@@ -33,13 +33,13 @@ pub struct ClockStatus {
     pub worst_ns: u32,
     /// It was within the window for as many samples as configured.
     pub is_locked: bool,
-    /// Operation needs its lock: it has SYNC signals or follows the reference. A clock without SYNC signals in front of
-    /// the reference follows the host's estimate of the time, and nothing waits for it.
+    /// Whether OP requires that the clock is locked: it has SYNC signals or follows the reference. A clock without SYNC
+    /// signals in front of the reference follows the host's estimate of the time, and no SubDevice waits for it.
     pub is_required: bool,
 }
 
 impl ClockStatus {
-    /// Whether operation needs its lock and does not have it.
+    /// Whether OP requires that the clock is locked, and it is not.
     pub const fn is_awaited(&self) -> bool {
         self.is_required && !self.is_locked && !self.is_reference
     }

@@ -65,7 +65,7 @@ impl Segment {
         self.report_reference(effects);
         self.report_hidden(effects);
         if self.clocks.elect(|_| true) != self.clocks.reference {
-            // Another one was chosen meanwhile.
+            // Another reference was chosen meanwhile.
             self.observe_choice(self.clocks.config.reference, effects);
         }
         self.compensate(effects);

@@ -239,7 +239,7 @@ impl Segment {
         match finding {
             MemberFinding::Reached(state) => self.settle(index, state, effects),
             MemberFinding::Returned => {
-                // It may be another unit of its type.
+                // It may be another SubDevice of the same type.
                 member.oddities = Default::default();
                 member.mistaken = Mistaken::default();
                 self.post_presence(index);

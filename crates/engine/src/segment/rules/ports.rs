@@ -35,7 +35,7 @@ impl Segment {
         self.altered.iter().map(restored).collect()
     }
 
-    /// The known port controls when all procedures have ended.
+    /// The known loop settings of ports, after all procedures have ended.
     pub(in crate::segment) fn lasting_controls(&mut self) -> Vec<PortControl> {
         let controls = core::mem::take(&mut self.port_controls).into_iter();
         controls.map(|entry| PortControl { under_way: 0, ..entry }).collect()

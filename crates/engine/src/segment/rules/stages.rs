@@ -69,7 +69,7 @@ impl Segment {
         }
     }
 
-    /// More was read of a scanned SubDevice. The list of SubDevices shares its data with the scan, unless there is
+    /// More data of a scanned SubDevice was read. The list of SubDevices shares its data with the scan, unless there is
     /// other data since then.
     pub(in crate::segment) fn observe_more(&mut self, key: SubDeviceKey, more: More<'_>, effects: &mut Effects) {
         if self.subdevices.at(key.station).is_none_or(|it| it.key != key) {
@@ -137,7 +137,7 @@ impl Segment {
     /// follow at once.
     pub(in crate::segment) fn deactivate(&mut self, effects: &mut Effects) {
         self.board.post_end();
-        // All procedures have ended, a former deactivation too.
+        // All procedures have ended, also an earlier deactivation.
         self.idle.work = Work::Nothing;
         let scanned = self.stage.scanned().cloned();
         let subdevices = scanned.as_ref().map(|it| SubDevices::of_scan(&it.found)).unwrap_or_default();

@@ -57,7 +57,7 @@ impl Segment {
         self.upkeeps().all(|(_, it)| it.is_settled())
     }
 
-    /// Whether no attempt is under way or falls due by itself: each is settled, or waits for a request.
+    /// Whether no attempt is running or due without a request: each SubDevice is settled, or waits for a request.
     pub fn are_attempts_ended(&self) -> bool {
         self.upkeeps().all(|(_, it)| it.is_settled() || it.progress == UpkeepProgress::Due(Instant::NEVER))
     }
@@ -83,7 +83,8 @@ impl Segment {
         self.upkeeps().skip(first).map(|(key, it)| (key, it.reached()))
     }
 
-    /// The others, with the numbers of their last attempts.
+    /// SubDevices that are neither in their requested states nor left as they are, with the numbers of their last
+    /// attempts.
     pub fn unsettled(&self) -> Vec<(SubDeviceKey, u32)> {
         self.upkeeps().filter(|(_, it)| !it.is_settled()).map(|(key, it)| (key, it.attempt)).collect()
     }

@@ -211,7 +211,7 @@ fn a_jump_from_monotonic_to_real_time_in_op_is_followed_within_3_s() {
             assert!(worst <= 1_000 && apart <= 1_000, "{text}: {worst} ns, {apart} ns");
             assert!(fewest >= PHASE as u64 + 495, "{text}: {fewest} pulses");
             assert!(ecrt.is_running(), "{text}: {}", ecrt.describe());
-            // One that starts its signals in the new time pulses with the others.
+            // A SubDevice that starts its signals after the jump pulses with the others.
             if let Some(last) = synced.last().filter(|last| **last > 0) {
                 ecrt.network().apply(Fault::PowerOff(DeviceIndex(*last)));
                 ecrt.cycles(100);
@@ -239,7 +239,7 @@ fn apart_ns(ecrt: &mut Ecrt, devices: &[usize]) -> u64 {
     apart
 }
 
-/// Programs set their time before they activate: pulses begin with the first one, not with the time of the activation.
+/// Programs set their time before the activation: pulses begin with the first time, not with that of the activation.
 // covers: 7.3, api, dc-sync
 #[test]
 fn pulses_begin_with_the_first_time_that_was_set_before_the_activation() {
@@ -271,7 +271,8 @@ fn pulses_begin_with_the_first_time_that_was_set_before_the_activation() {
     }
 }
 
-/// The time is given first when all are on their way to SAFEOP: what starts then, and what starts later, has one grid.
+/// The time is first set when all SubDevices are on their way to SAFEOP: signals that start then or later have the same
+/// grid.
 // covers: 7.3, api, dc-sync
 #[test]
 fn pulses_that_start_before_and_after_the_first_time_have_one_grid() {

@@ -157,10 +157,11 @@ fn an_eni_without_mailboxes_reaches_op_with_those_of_the_eeproms() {
     assert_eq!(states(&application), 6, "all of them accept PREOP");
 }
 
-/// The device needs others, or takes them: the file counts, and one event names the difference.
+/// The device needs the addresses of the SII, or accepts others: those of the file are used, and one event reports the
+/// difference.
 // covers: eni-run
 #[test]
-fn each_place_of_an_eni_that_is_not_that_of_the_sii_is_named_once() {
+fn each_address_of_an_eni_that_differs_from_the_sii_is_reported_once() {
     let export = scanned().to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
     let named = |file: EniFile, wanted: &str| {
         let mut application = start(network(BUS), file, false).expect("it is activated").application;

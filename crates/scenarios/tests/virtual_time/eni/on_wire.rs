@@ -1,4 +1,5 @@
-//! Commands of a file as they leave: each try, frames of their own, VoE, and the ways to BOOT and back (protocol 8.2).
+//! Commands of a file on the wire: retries, frames of their own, VoE, and the transitions to BOOT and back (protocol
+//! 8.2).
 
 use ringcat::simulated::SimulatedSegment;
 use ringcat::{Event, MainDevice, Options, SubDeviceId};
@@ -14,7 +15,7 @@ use super::{DRIVE, EniFile, activate};
 
 /// A register that no controller has.
 const UNUSED: u16 = 0x0E80;
-/// Enough for some hundred tries, one in a millisecond.
+/// Enough for some hundred retries, one per millisecond.
 const CYCLES: usize = 2_000;
 
 /// Command and register of each datagram, frame by frame, until the drive is in OP or has failed; whether it failed.

@@ -124,7 +124,7 @@ fn declare(dice: &mut Dice, main_device: &MainDevice<Tap>) -> Declaration {
 fn examine(dice: &mut Dice, main_device: &mut MainDevice<Tap>) {
     match dice.below(4) {
         0 => _ = main_device.port_report(),
-        // The caller gives up.
+        // The caller stops waiting for the result.
         1 => {
             let report = main_device.engine_mut().start_port_report();
             main_device.attend(Duration::from_micros(dice.below(12_000)));

@@ -13,9 +13,10 @@ use scenarios::world::CYCLE;
 use super::{ONE, one_ring};
 
 const SECOND: Duration = Duration::from_secs(1);
-/// From the start of the application on: a frame that was sent before may still close ports, another one opens them.
+/// Time from the start of an application until all ports must be open: a frame that was sent before may still close
+/// ports, another one opens them.
 const OPENED: Duration = Duration::from_millis(5);
-/// Longest start of an application.
+/// Maximum duration of the start of an application.
 const STARTED: Duration = Duration::from_millis(300);
 /// The cable to the last SubDevice.
 const BRANCH: CableId = CableId(7);
@@ -64,7 +65,7 @@ fn a_test_of_a_connection_ends_when_an_application_begins() {
             main_device.add_junction_connection(connection).expect("ports that exist");
             let mut check = Some(main_device.engine_mut().start_connection_check());
             main_device.attend(Duration::from_micros(after));
-            // Or the caller gives up.
+            // The caller may stop waiting for the result.
             check = check.filter(|_| number % 2 == 0);
             were_closed += usize::from(begin(main_device, 2 * SECOND, &format!("{wrong}, {after} us")));
             drop(check);
@@ -73,7 +74,8 @@ fn a_test_of_a_connection_ends_when_an_application_begins() {
     assert!(were_closed > 3, "{were_closed}");
 }
 
-/// A branch comes, and the scan that follows examines the ring; the application does not wait for its end.
+/// A branch is connected, and the scan that follows examines the ring; the application does not wait for the end of the
+/// scan.
 // covers: JR-03, junctions, states
 #[test]
 fn ports_that_a_scan_has_closed_are_opened_when_an_application_begins() {

@@ -225,7 +225,7 @@ fn a_wrong_connection_is_not_accepted_while_a_scan_begins() {
     assert!(not_tested > 0, "no scan began in a test");
 }
 
-/// The test reads the ports, and thereby clears the events that show a change to idle operation.
+/// The test reads the ports, which clears the events by which idle operation detects a change.
 // covers: JR-05, JR-06, junctions, ring-goes-on
 #[test]
 fn a_change_that_only_the_test_of_a_connection_sees_is_followed() {

@@ -189,11 +189,12 @@ fn other_controllers_at_known_station_addresses_are_not_taken_for_the_known_ones
     }
 }
 
-/// A segment of which the last cable is cut or healed before each round of reads that compares it with what is known.
+/// A segment whose last cable is cut or healed before each round of reads that compares the segment with the knowledge.
 struct Flickering {
     tap: Tap,
     is_cut: bool,
-    /// The second round finds what the first one has found: only then a crashed owner's ports are not its cause.
+    /// The second round has the same result as the first one: this shows that ports of a crashed owner are not the
+    /// cause.
     is_twice: bool,
 }
 
@@ -233,7 +234,7 @@ impl Links for Flickering {
 
 // covers: states
 #[test]
-fn a_segment_that_changes_after_each_scan_is_given_up_with_a_reason() {
+fn resume_fails_with_a_reason_if_the_segment_changes_after_each_scan() {
     for handover in HANDOVERS {
         let instantly = NetworkOptions::default().with_detection_delay(Duration::ZERO);
         let former = idle(line(descriptions(&["servo", "digital-input-8"]), instantly));

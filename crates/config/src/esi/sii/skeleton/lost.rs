@@ -1,4 +1,4 @@
-//! Fields of an image that have no place in a description: an image that any tool makes of the description does not
+//! Fields of an image that have no place in a description: an image that a tool makes from the description does not
 //! have them.
 
 use std::collections::{BTreeMap, BTreeSet};

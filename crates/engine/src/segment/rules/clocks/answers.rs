@@ -11,7 +11,7 @@ use crate::segment::model::Segment;
 use crate::time::Instant;
 
 impl Segment {
-    /// Stores the differences. The lock is reported when all that are required are within the window.
+    /// Stores the differences. The lock is reported when all required clocks are within the window.
     pub(super) fn observe_differences(&mut self, answers: &Answers, effects: &mut Effects) {
         let differences = self.differences(answers);
         // While no time is distributed, differences belong to a frame with another path.

@@ -200,7 +200,7 @@ impl Segment {
             return;
         }
         node.losses = node.losses.wrapping_add(1);
-        // It was measured without them, or is going to be.
+        // The clock was measured without its registers, or will be.
         let is_known = node.is_unset && node.unit.is_some();
         (node.is_unset, node.latches_backwards, node.filter_depths) = (true, false, None);
         node.has_signals = false;
