@@ -132,7 +132,7 @@ fn a_clock_without_sync_in_front_of_the_reference_delays_no_subdevice() {
 // covers: 7.2, 7.3, dc-reference
 #[test]
 fn clocks_in_front_of_the_reference_lock_and_are_exact_in_short_and_long_cycles() {
-    // Clocks that differ by more than 150 ppm swing around the prediction (docs/dc.md): a drive has a crystal of 50 ppm.
+    // Clocks that differ by 190 ppm swing around the prediction (docs/dc.md, "What drift does to the loop").
     for (count, ppm, cycle_us) in [(2, 50, 1_000), (3, 50, 1_000), (10, 50, 250), (10, 50, 4_000), (3, 50, 4_000)] {
         for closed in [false, true] {
             let text = format!("{count} of {ppm} ppm, ring {closed}, each {cycle_us} us");
