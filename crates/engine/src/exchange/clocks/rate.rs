@@ -117,7 +117,7 @@ mod tests {
 
     // covers: 7.2, dc-late-host
     #[test]
-    fn the_rate_is_known_within_two_blocks_and_without_the_delay_of_the_host_after_seconds() {
+    fn the_rate_is_known_after_two_blocks_and_exact_with_a_late_host_after_seconds() {
         for cycle_ns in [62_500, 250_000, 1_000_000, 4_000_000] {
             for ppb in [-200_000, -50_000, 0, 30, 100_000] {
                 let mut exact = Rate::default();
