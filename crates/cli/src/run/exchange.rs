@@ -57,8 +57,12 @@ impl Run {
         }
     }
 
+    /// Whether all clocks are locked, where there are any.
     fn clocks_locked(&self) -> bool {
-        !self.clocks || self.cycles.supervisor().clocks_locked().unwrap_or(false)
+        let supervisor = self.cycles.supervisor();
+        !self.clocks
+            || supervisor.clocks_locked().unwrap_or(false)
+            || supervisor.clocks().is_ok_and(|clocks| clocks.is_empty())
     }
 
     /// Until all SubDevices are in OP and all clocks are locked, and then until process data is complete, for a moment.

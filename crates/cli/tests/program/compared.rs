@@ -160,3 +160,28 @@ fn pdos_of_modules_that_the_eeprom_cannot_list_are_no_differences() {
         }
     }
 }
+
+/// A device refuses a mapping that its SII fixes: a file of a scan says so, and its ENI has no command for it.
+// covers: network-file, eni-run
+#[test]
+fn a_file_of_a_scan_has_the_pdos_fixed_that_the_sii_fixes() {
+    let place = Place::new("fixed");
+    let bus = place.write("bus.toml", "[[device]]\nesi = \"acme.xml\"\ntype = \"AA02\"\n");
+    let (machine, eni) = (place.path("machine.toml"), place.path("machine.xml"));
+    for (coe, fixed) in [("PdoAssign=\"true\" PdoConfig=\"true\"", 2), ("PdoAssign=\"true\"", 0)] {
+        place.write(
+            "acme.xml",
+            &fs::read_to_string(format!("{ACME}/acme.xml"))
+                .expect("it is readable")
+                .replace("<CoE SdoInfo=\"true\" PdoAssign=\"true\"", &format!("<CoE SdoInfo=\"true\" {coe}")),
+        );
+        let init = ringcat(&["init", "--sim", &bus, "--overwrite", "--out", &machine]);
+        assert_eq!(init.code, Some(0), "{}", init.all());
+        assert_eq!(place.read("machine.toml").matches("fixed = true").count(), fixed, "{coe}");
+        let export = ringcat(&["eni", "export", "--network", &machine, "--overwrite", "--out", &eni]);
+        assert_eq!(export.code, Some(0), "{}", export.all());
+        let text = place.read("machine.xml");
+        assert!(text.contains("assign pdo 0x1a00"), "PDOs are assigned: {coe}");
+        assert!(!text.contains("clear pdo 0x1a0"), "they are mapped: {coe}");
+    }
+}

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use ringcat_engine::Topology;
 use ringcat_engine::config::SubDeviceConfig;
-use ringcat_engine::info::{Direction, PdoInfo, SubDeviceInfo};
+use ringcat_engine::info::{Direction, SubDeviceInfo};
 use ringcat_engine::{AreaPlan, MappedPdo, plan};
-use ringcat_wire::sii::MailboxLayout;
+use ringcat_wire::sii::{MailboxLayout, Pdo as SiiPdo};
 
 use super::model::{
     self, Buffer, CheckRevision, Clocks, Domain, Entry, Mailbox, NetworkFile, Pdo, PluggedInto, Protocol, Redundancy,
@@ -178,13 +178,15 @@ fn sync_manager(info: &SubDeviceInfo, area: &AreaPlan) -> SyncManager {
         control: described.map(|sm| sm.control),
         op_only: area.op_only,
         length: (area.pdos.is_empty() && area.length > 0).then_some(area.length),
-        pdo: area.pdos.iter().map(|pdo| of_pdo(info.pdo(pdo.index), pdo)).collect(),
+        pdo: area.pdos.iter().map(|pdo| of_pdo(info, pdo)).collect(),
         ..SyncManager::default()
     }
 }
 
-/// A PDO with the names and types of the SII.
-fn of_pdo(described: Option<&PdoInfo>, pdo: &MappedPdo) -> Pdo {
+/// A PDO with the names and types of the SII. It is fixed where a mapping could be written and the SII permits none.
+fn of_pdo(info: &SubDeviceInfo, pdo: &MappedPdo) -> Pdo {
+    let described = info.pdo(pdo.index);
+    let takes_mappings = info.protocols.coe() && info.coe.pdo_configuration();
     let texts = described.map(|described| &described.entries[..]).unwrap_or_default();
     let entry = |(at, mapped): (usize, &ringcat_engine::MappedEntry)| {
         let described = texts.get(at);
@@ -203,7 +205,7 @@ fn of_pdo(described: Option<&PdoInfo>, pdo: &MappedPdo) -> Pdo {
     Pdo {
         index: pdo.index,
         name: described.map(|described| printable(&described.name)).unwrap_or_default(),
-        fixed: false,
+        fixed: takes_mappings && described.is_some_and(|described| described.flags & SiiPdo::FIXED != 0),
         // The format has no entries without bits: such a mapping is left to the SII.
         entries: Some(entries).filter(|entries| entries.iter().all(|entry| entry.bits > 0)),
     }
