@@ -144,14 +144,21 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
 }
 
 /// The SubDevice has refused a state because another request took effect meanwhile: it was in another state than the
-/// preceding one (AL status code 0x0011), or PREOP was requested before its mailboxes were enabled (0x0016).
+/// preceding one (AL status code 0x0011), or PREOP was requested before its mailboxes were enabled (0x0016), or SAFEOP
+/// before its process data was configured (0x001D, 0x001E). INIT, and PREOP after INIT, are always valid requests.
 fn was_changed(error: &ConfigureError) -> bool {
     let ConfigureError::State(al_state::StateError::Refused { requested, status, code }) = error else { return false };
+    let is_early =
+        [AlStatusCode::INVALID_OUTPUT_CONFIGURATION, AlStatusCode::INVALID_INPUT_CONFIGURATION].contains(code);
     let before = match requested {
-        AlState::PreOp => return *code == AlStatusCode::INVALID_MAILBOX_CONFIGURATION_PREOP,
+        AlState::Init | AlState::PreOp => {
+            let is_mailbox = *code == AlStatusCode::INVALID_MAILBOX_CONFIGURATION_PREOP;
+            return is_early || is_mailbox || *code == AlStatusCode::INVALID_STATE_CHANGE;
+        }
+        AlState::SafeOp if is_early => return true,
         AlState::SafeOp => AlState::PreOp,
         AlState::Op => AlState::SafeOp,
-        AlState::Init | AlState::Boot => return false,
+        AlState::Boot => return false,
     };
     let is_between = status.al_state().is_some_and(|state| state == before || state == *requested);
     *code == AlStatusCode::INVALID_STATE_CHANGE && !is_between

@@ -6,7 +6,7 @@ use crate::junction::JunctionMode;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Retries {
-    /// It is repeated after pauses of 100 ms to 5 s, without end.
+    /// It is repeated after pauses of 100 ms to 5 s, without end; after a loss of frames the first pauses are shorter.
     #[default]
     Always,
     /// The SubDevice stays as it is until a retry is requested. Losses of frames are repeated at any rate.

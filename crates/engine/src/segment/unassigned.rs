@@ -1,5 +1,5 @@
 //! SubDevices that answer but have no assigned station address. If such a SubDevice is not declared it keeps a
-//! temporary address, and is evaluated again when a declared one is lost.
+//! temporary address, and is evaluated again when a declared one is lost that was never there beside it.
 
 use alloc::vec::Vec;
 use core::ops::Deref;
@@ -32,6 +32,8 @@ pub struct Unassigned {
     pub reported: bool,
     /// Since this time several members are possible.
     pub(super) held_since: Option<Instant>,
+    /// Members that answered while it was known to be none of them: it is none of these, whatever its identity is.
+    pub(super) beside: Vec<usize>,
     /// Where the PDOs of its SII are known from when it is read.
     pub(super) pdo_source: PdoSource,
     /// Its requested state and the attempts to reach it; `None` without a request.
@@ -58,6 +60,7 @@ impl Unassigned {
             from_main: at.position < at.main_count,
             reported: false,
             held_since: None,
+            beside: Vec::new(),
             pdo_source: PdoSource::Outdated,
             upkeep: None,
         }

@@ -4,6 +4,8 @@
 use std::time::Duration;
 
 use ringcat::{Declaration, Error, LastOutputs, MainDevice, Options, SubDeviceConfig};
+use ringcat_sim::cable::CableId;
+use ringcat_sim::fault::Fault;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::al::{AlState, AlStatus};
 use scenarios::calls::witness::is_idle;
@@ -13,6 +15,8 @@ use scenarios::tap::Tap;
 /// A tenth of the change from INIT to PREOP.
 const STEP: Duration = Duration::from_micros(100);
 const LIMIT: Duration = Duration::from_secs(1);
+/// Well below the watchdog of process data.
+const LONGEST: Duration = Duration::from_millis(80);
 const KINDS: [&str; 3] = ["servo", "digital-output-8", "emulated-output-8"];
 /// Time that a SubDevice needs for a state: longer than all other steps of a configuration.
 const SLOW: Duration = Duration::from_millis(30);
@@ -78,4 +82,32 @@ fn a_deactivation_waits_for_slow_state_changes_that_were_requested_before() {
             }
         }
     }
+}
+
+/// Frames are lost at each moment of a deactivation. The attempt that ends by it is repeated soon, before the watchdogs
+/// of the SubDevices with held outputs expire (100 ms).
+// covers: stop, 5.3
+#[test]
+fn lost_frames_make_no_deactivation_last_until_a_watchdog_expires() {
+    let mut slowest = Duration::ZERO;
+    for (at_us, lost) in (0..6_000).step_by(50).flat_map(|at_us| [1, 2, 3].map(|lost| (at_us, lost))) {
+        for network in networks(false) {
+            let mut main_device = MainDevice::request(Tap::new(network), &Options::default());
+            let scan = main_device.scan().expect("it can be scanned");
+            let declaration = ringcat::automatic(&scan.subdevices, STEP);
+            let mut application = main_device.activate(declaration).map_err(Error::from).expect("it fits");
+            (0..1_000).for_each(|_| application.cycle(|_| ()));
+            assert!(application.all_settled());
+            let network = application.links_mut().network_mut();
+            let at = network.now() + Duration::from_micros(at_us);
+            network.schedule(at, Fault::Drop { cable: CableId(1), direction: None, count: lost });
+            let begun = application.now();
+            let ended = application.deactivate(LastOutputs::Held, LIMIT);
+            let ended = ended.unwrap_or_else(|refused| panic!("{lost} lost after {at_us} us: {}", refused.error));
+            let took = ended.now().since(begun);
+            assert!(took < LONGEST, "{lost} lost after {at_us} us: {took:?}");
+            slowest = slowest.max(took);
+        }
+    }
+    println!("deactivation with lost frames: at most {slowest:?}");
 }

@@ -5,7 +5,7 @@ use std::cell::Cell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use ringcat::{Event, MainDevice, Options, Position, SubDeviceId, TransferLimits, Unsolicited, automatic};
+use ringcat::{Event, MainDevice, Options, Position, SubDevice, SubDeviceId, TransferLimits, Unsolicited, automatic};
 use ringcat_engine::mail::eoe::EthernetPort;
 use ringcat_engine::mail::voe::{self, Voe};
 use ringcat_engine::mail::{Limits, MailboxError};
@@ -269,5 +269,57 @@ fn emergencies_of_a_position_continue_after_a_power_cycle_without_a_declaration(
                 assert_eq!(codes, AT.map(|at| Some(at + round)), "{off:?}, round {round}");
             }
         }
+    }
+}
+
+/// More emergencies than rings hold, of a declared and an undeclared SubDevice, beside transfers, with and without lost
+/// frames: each that was sent is read, cleared or counted once, and is one event.
+// covers: 6.3, sdo-information, mailbox
+#[test]
+fn each_emergency_of_a_flood_is_read_cleared_or_counted_once() {
+    const AT: [usize; 2] = [1, 2];
+    for (lost, sizes) in [0, 20].into_iter().flat_map(|lost| [[0, 1], [8, 0], [1, 300]].map(|sizes| (lost, sizes))) {
+        let network = ring(descriptions(&["coupler", "all-protocols", "all-protocols"]), NetworkOptions::default());
+        let mut main_device = MainDevice::request(Tap::new(network), &Options::default().with_idle_operation(true));
+        main_device.attend(Duration::from_millis(400));
+        let declaration = automatic(&main_device.subdevices()[..2], CYCLE);
+        let mut application = main_device.activate(declaration).map_err(ringcat::Error::from).expect("it fits");
+        (0..800).for_each(|_| application.cycle(|_| ()));
+        let next = application.engine_mut().snapshot().next_event;
+        let position = |at: usize| Position(at as u16);
+        let mut create = |at, size| SubDevice::new(&mut application, position(at)).create_emergency_ring(size);
+        let rings: Vec<ringcat::EmergencyRing> = AT.into_iter().zip(sizes).map(|(at, size)| create(at, size)).collect();
+        application.links_mut().lose_per_mille(lost, 7);
+        let (mut sent, mut got) = ([0; 2], [0; 2]);
+        for step in 0..1_500_u16 {
+            for (number, ring) in rings.iter().enumerate() {
+                let device = application.links_mut().network_mut().device_mut(DeviceIndex(AT[number]));
+                sent[number] += u64::from(device.application.emergency(&emergency(step)));
+                if step % 20 == 0 {
+                    got[number] += std::iter::from_fn(|| ring.pop()).take(3).count() as u64;
+                }
+                if step % 400 == 399 {
+                    got[number] += ring.len() as u64 + ring.overruns();
+                    ring.clear();
+                }
+            }
+            if step % 50 == 0 {
+                let read = SubDevice::new(&mut application, position(AT[0])).sdo_read::<u32>(0x1018, 1);
+                let read = application.cycle_until(read, Duration::from_secs(1), |_| ());
+                assert!(read.is_ok() || lost > 0, "{sizes:?}: {read:?}");
+            }
+            application.cycle(|_| ());
+        }
+        application.links_mut().lose_per_mille(0, 7);
+        (0..2_000).for_each(|_| application.cycle(|_| ()));
+        for (number, ring) in rings.iter().enumerate() {
+            got[number] += ring.len() as u64 + ring.overruns();
+        }
+        assert_eq!(got, sent, "rings of {sizes:?}, {lost} of 1,000 frames lost");
+        let since = application.engine_mut().events_since(next);
+        let reported =
+            since.events.iter().filter(|timed| matches!(timed.event, Event::Emergency { .. })).count() as u64;
+        assert_eq!((since.missed, reported), (0, sent[0] + sent[1]), "rings of {sizes:?}");
+        assert!(sent.iter().all(|sent| *sent > 1_000), "{sent:?}");
     }
 }

@@ -249,6 +249,55 @@ fn an_optional_subdevice_does_not_take_the_place_of_an_identical_one() {
     assert_eq!(world.application().states()[1], SubDeviceState::Absent);
 }
 
+/// Power of a declared SubDevice fails beside undeclared ones of its type. A ring reaches those behind it from the
+/// other side, a line those in front of it. Judged inside the undeclared ones in each cycle.
+// covers: identity
+#[test]
+fn an_undeclared_twin_does_not_take_the_place_of_a_lost_subdevice() {
+    let kinds = ["coupler", "digital-output-8", "digital-output-8", "digital-output-8"];
+    let cases: [(bool, usize); 5] = [(true, 1), (true, 2), (true, 3), (false, 2), (false, 3)];
+    for ((is_ring, off), with_idle) in cases.into_iter().flat_map(|case| [true, false].map(|idle| (case, idle))) {
+        for off_ms in [1, 5, 100, 1_500] {
+            let text = format!("ring {is_ring}, SubDevice {off} for {off_ms} ms, idle operation {with_idle}");
+            let build = if is_ring { ring } else { line };
+            let network = build(descriptions(&kinds), NetworkOptions::default());
+            let options = Options::default().with_idle_operation(with_idle);
+            let declare =
+                |scan: &ringcat::Scan| automatic(&[scan.subdevices[0].clone(), scan.subdevices[off].clone()], CYCLE);
+            let mut world = World::with(9, network, &options, declare).expect("scan and activation");
+            world.settle();
+            world.evaluate_latched(false);
+            let twins: Vec<usize> = (1..kinds.len()).filter(|at| *at != off).collect();
+            let are_left = |world: &mut World, cycles: u64| {
+                for cycle in 0..cycles {
+                    world.run_cycles(1);
+                    for at in &twins {
+                        let device = world.network().device(DeviceIndex(*at));
+                        let is_left = matches!(device.al_status().al_state(), Some(AlState::Init | AlState::PreOp));
+                        assert!(is_left, "{text}: SubDevice {at} is in {} after {cycle}", device.al_status());
+                    }
+                }
+            };
+            for round in 0..3 {
+                world.power_off(DeviceIndex(off));
+                are_left(&mut world, off_ms);
+                world.power_on(DeviceIndex(off));
+                are_left(&mut world, 1_000);
+                until_settled(&mut world);
+                assert_eq!(states(&world)[off], AlState::Op, "{text}");
+                if round == 0 {
+                    // One that is found later is none of the others, either.
+                    world.power_off(DeviceIndex(twins[0]));
+                    are_left(&mut world, 200);
+                    world.power_on(DeviceIndex(twins[0]));
+                    are_left(&mut world, 1_000);
+                    until_settled(&mut world);
+                }
+            }
+        }
+    }
+}
+
 /// An endless chain of categories: reading it takes seconds, and its contents are invalid.
 fn corrupt_sii(world: &mut World, device: DeviceIndex) {
     world.fault(Fault::CorruptSii { device, offset: 0x0E, mask: 0xFF });

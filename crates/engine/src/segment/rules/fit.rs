@@ -9,6 +9,9 @@ use crate::segment::unassigned::UnassignedView;
 pub(super) fn fit(segment: &Segment, it: UnassignedView<'_>, index: usize) -> Fit {
     let Some(member) = segment.member(index) else { return Fit::No };
     let Some(info) = it.knowledge.info() else { return Fit::Unreadable };
+    if it.beside.contains(&index) {
+        return Fit::No;
+    }
     let identity = &info.identity;
     let mark_fits = match member.config.address {
         // One that was here before is known by its identity, wherever positions are counted from meanwhile.

@@ -185,12 +185,16 @@ impl Segment {
     pub(in crate::segment) fn lose(&mut self, index: usize, effects: &mut Effects) {
         let Some(member) = self.subdevices.member_mut(index) else { return };
         member.attempt = member.attempt.wrapping_add(1);
-        if member.phase != Phase::Absent {
+        let answered = member.phase != Phase::Absent;
+        if answered {
             member.phase = Phase::Absent;
             member.incidents.absences = member.incidents.absences.saturating_add(1);
             effects.report(Event::Lost { subdevice: SubDeviceId(index) });
         }
         let is_excused = !member.exchanges(member.target);
+        if answered {
+            self.tell_apart(index);
+        }
         self.post_presence(index);
         self.board.set_taking_part(index, false);
         self.board.set_unproven(index, false);

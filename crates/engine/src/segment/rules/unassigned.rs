@@ -59,8 +59,9 @@ impl Segment {
         for (key, _, it) in self.subdevices.all_unassigned_mut() {
             if let Some(position) = view.position(key.station) {
                 let at = At { position, owners: &owners, main_count };
+                let beside = core::mem::take(&mut it.beside);
                 let Unassigned { reported, held_since, pdo_source, upkeep, .. } = *it;
-                *it = Unassigned { reported, held_since, pdo_source, upkeep, ..Unassigned::at(&at) };
+                *it = Unassigned { reported, held_since, beside, pdo_source, upkeep, ..Unassigned::at(&at) };
             }
         }
     }
@@ -139,6 +140,15 @@ impl Segment {
                     effects.report(Event::ScanFailed { reason: reason.clone() });
                     *knowledge = Knowledge::Unreadable(reason);
                 }
+            }
+        }
+    }
+
+    /// A member that answered no longer does. SubDevices that were known to be undeclared then are others.
+    pub(in crate::segment) fn tell_apart(&mut self, index: usize) {
+        for (_, knowledge, it) in self.subdevices.all_unassigned_mut() {
+            if it.reported && knowledge.info().is_some() && !it.beside.contains(&index) {
+                it.beside.push(index);
             }
         }
     }

@@ -192,7 +192,7 @@ fn with_retries_on_request_a_refusal_waits_and_a_lost_frame_does_not() {
     assert_eq!(idle.end(begun[0], lost()), [], "nothing is kept, so nothing is reported");
     idle.end(begun[1], refusal());
     idle.end(begun[2], refusal());
-    let pause = idle.now + Duration::from_millis(100);
+    let pause = idle.now + Duration::from_millis(5);
     assert_eq!(
         [0, 1, 2].map(|at| idle.progress(at).1),
         [pause, Instant::NEVER, Instant::NEVER].map(UpkeepProgress::Due)

@@ -10,8 +10,10 @@ use ringcat_wire::al::{AlState, AlStatus};
 use crate::segment::choices::Retries;
 use crate::time::Instant;
 
-/// Pause before the first repeated attempt; it doubles with every failure.
+/// Pause before the first attempt after a refusal; it doubles with every failure.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
+/// The same after a loss of frames: outputs may be held meanwhile, until a watchdog of 100 ms expires.
+const FIRST_PAUSE_OF_BUS: Duration = Duration::from_millis(5);
 /// Longest pause between attempts.
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 
@@ -173,7 +175,8 @@ impl Upkeep {
             self.target = core::mem::replace(&mut self.before, AlState::PreOp);
         }
         self.failures = self.failures.saturating_add(1);
-        let pause = FIRST_PAUSE.saturating_mul(1 << (self.failures - 1).min(8)).min(LONGEST_PAUSE);
+        let first = if *is_of_bus { FIRST_PAUSE_OF_BUS } else { FIRST_PAUSE };
+        let pause = first.saturating_mul(1 << (self.failures - 1).min(10)).min(LONGEST_PAUSE);
         let waits = retries == Retries::OnRequest && !is_of_bus && tried == self.target;
         self.progress = UpkeepProgress::Due(if waits { Instant::NEVER } else { now + pause });
         self.failures == 1 || !is_of_bus
