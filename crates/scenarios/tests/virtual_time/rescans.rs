@@ -303,8 +303,8 @@ fn a_rescan_of_a_closed_ring_with_a_branch_on_port_2_gives_true_places() {
     }
 }
 
-/// An unassigned SubDevice identical to a declared one is part of the cabling; when the declared one leaves, it keeps its
-/// place, and gets no outputs of the other.
+/// An unassigned SubDevice identical to a declared one is part of the cabling; when the declared one leaves, it keeps
+/// its place, and gets no outputs of the other.
 // covers: CR-09, CR-17, rescan
 #[test]
 fn an_unassigned_subdevice_keeps_its_rescan_place_beside_a_lost_twin() {
