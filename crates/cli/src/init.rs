@@ -121,6 +121,9 @@ pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
     options.check_revision = arguments.revisions.into();
     options.check_serial = arguments.serials;
     let mut file = NetworkFile::from_scan(&bus.scan.subdevices, &bus.scan.topology, &options);
+    if arguments.clocks && file.clocks.is_none() {
+        warn("no SubDevice has a distributed clock: the file has no table [clocks]");
+    }
     let named = complete(arguments, &bus, &mut file, descriptions.as_mut())?;
     let text = file.to_text();
     // What is written must be what `run` reads.

@@ -3,7 +3,7 @@
 use std::thread::sleep;
 use std::time::Duration;
 
-use ringcat::{AlState, CyclicThread, DomainId, DomainState, Instant, SubDeviceState};
+use ringcat::{CyclicThread, DomainId, DomainState, Instant, SubDeviceState};
 
 use super::beside::Beside;
 use super::live::{self, Live};
@@ -126,7 +126,7 @@ impl Run {
     fn what_is_missing(&self, limit: Duration) -> String {
         let limit = in_words(limit);
         let states = self.cycles.supervisor().states();
-        let late = states.iter().filter(|state| **state != SubDeviceState::Settled(AlState::Op)).count();
+        let late = states.iter().filter(|state| !matches!(state, SubDeviceState::Settled(_))).count();
         if late == 0 {
             return format!("not all clocks are locked within {limit}");
         }

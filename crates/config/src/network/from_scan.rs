@@ -31,7 +31,7 @@ pub struct ScanOptions {
     pub period: Duration,
     /// The scan used two links.
     pub ring: bool,
-    /// Distributed clocks are used.
+    /// Distributed clocks are used, if a SubDevice has one.
     pub clocks: bool,
     /// SubDevices with an alias that no other has are found by it.
     pub by_alias: bool,
@@ -86,7 +86,7 @@ impl NetworkFile {
             ringcat_network: model::VERSION,
             name: options.name.clone(),
             redundancy: Redundancy { ring: options.ring, ..Redundancy::default() },
-            clocks: options.clocks.then(|| clocks(found, &names)),
+            clocks: options.clocks.then(|| clocks(found, &names)).flatten(),
             domain: vec![Domain {
                 name: DOMAIN.to_owned(),
                 period: Time(options.period),
@@ -111,9 +111,9 @@ fn names(found: &[SubDeviceInfo]) -> Vec<String> {
 
 /// Clocks with the reference that the engine takes where none is named, the first SubDevice with a clock. An ENI made
 /// from the file names the same reference.
-fn clocks(found: &[SubDeviceInfo], names: &[String]) -> Clocks {
-    let first = found.iter().position(|info| info.controller.features.dc);
-    Clocks { reference: first.map(|index| names[index].clone()), ..Clocks::default() }
+fn clocks(found: &[SubDeviceInfo], names: &[String]) -> Option<Clocks> {
+    let first = found.iter().position(|info| info.controller.features.dc)?;
+    Some(Clocks { reference: Some(names[first].clone()), ..Clocks::default() })
 }
 
 /// A text of an EEPROM without control characters and outer blanks.
