@@ -185,7 +185,7 @@ demo() {
     local too_large=0
     cargo run --release
     cargo run --release -- demo --standby
-    small ringcat 10900000 || too_large=1
+    small ringcat 10950000 || too_large=1
     small ringcatd 7100000 || too_large=1
     small ethercat 1780000 || too_large=1
     return "$too_large"
