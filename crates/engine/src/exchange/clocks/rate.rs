@@ -35,8 +35,9 @@ struct Block {
     /// Time of the reference minus that of the host in the first reading.
     offset: u64,
     begin: Instant,
-    /// Differences of the others from it.
+    /// Differences of the others from it, and their times after its time.
     sum: i64,
+    after_ns: u64,
     count: u32,
 }
 
@@ -63,21 +64,23 @@ impl Rate {
     #[inline(always)]
     pub(super) fn read(&mut self, time: u64, sent_at: Instant) {
         let offset = time.wrapping_sub(sent_at.0);
-        let begin = Block { offset, begin: sent_at, sum: 0, count: 0 };
+        let begin = Block { offset, begin: sent_at, sum: 0, after_ns: 0, count: 0 };
         let block = self.block.get_or_insert(begin);
         block.sum = block.sum.wrapping_add(offset.wrapping_sub(block.offset) as i64);
+        block.after_ns = block.after_ns.wrapping_add(sent_at.0.wrapping_sub(block.begin.0));
         block.count += 1;
         if block.count == BLOCK {
-            self.evaluate(sent_at);
+            self.evaluate();
         }
     }
 
     /// Compares a full block with the first one.
     #[cold]
-    fn evaluate(&mut self, end: Instant) {
+    fn evaluate(&mut self) {
         let Some(block) = self.block.take() else { return };
         let mean = block.sum / i64::from(BLOCK);
-        let at = Instant(block.begin.0 + end.0.saturating_sub(block.begin.0) / 2);
+        // Readings may have been seldom, or left out for a while.
+        let at = Instant(block.begin.0.saturating_add(block.after_ns / u64::from(BLOCK)));
         let newest = Mean { offset: block.offset.wrapping_add(mean as u64), at };
         let Some(first) = self.first else {
             self.first = Some(newest);
@@ -129,6 +132,16 @@ mod tests {
                 assert!((gained(&late) - ppb / 1_000).abs() <= 3, "{cycle_ns}, {ppb}: {}", gained(&late));
             }
         }
+    }
+
+    // covers: 7.2
+    #[test]
+    fn readings_at_unequal_distances_give_the_same_rate() {
+        let mut rate = Rate::default();
+        read(&mut rate, (0, 64 + 10), 1_000_000, 50_000, 0);
+        // Nothing is distributed for 5 s, in the middle of a block.
+        read(&mut rate, (5_000, 54), 1_000_000, 50_000, 0);
+        assert!((49..=50).contains(&rate.gained(1_000_000)), "{}", rate.gained(1_000_000));
     }
 
     // covers: 7.2
