@@ -123,6 +123,11 @@ fn a_clock_without_sync_in_front_of_the_reference_delays_no_subdevice() {
             let [apart] = watch(&mut world, [&behind], 3_000);
             assert!(apart <= 100, "{text}: {apart} ns apart");
             assert_eq!((window_events(&world, mark), world.left_op(mark)), (0, Vec::new()), "{text}");
+            // The clock of a SubDevice that does not answer is required all the same: it is not shown as unused.
+            world.power_off(DeviceIndex(count - 1));
+            world.run_cycles(100);
+            let clocks = world.application().engine().clocks();
+            assert!(clocks[count - 1].is_required && !clocks[0].is_required, "{text}: {clocks:?}");
         }
     }
 }

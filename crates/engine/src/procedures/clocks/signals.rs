@@ -181,7 +181,7 @@ pub(in crate::procedures) async fn wait_for_lock(
     };
     let check = |clocks: &Clocks| {
         let own = clocks.of_member(member);
-        let is_open = |node: &&Node| clocks.is_required(node) && node.good < samples && !clocks.is_reference(node);
+        let is_open = |node: &&Node| clocks.is_waited_for(node) && node.good < samples && !clocks.is_reference(node);
         // Its own clock first: if that is right, another clock is the cause of the wait.
         let at_fault = own.filter(is_open).or_else(|| clocks.nodes.iter().find(is_open));
         let difference_ns = at_fault.or(own).and_then(|node| node.difference_ns);

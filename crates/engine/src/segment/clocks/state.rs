@@ -186,14 +186,19 @@ impl Clocks {
     /// Whether a required clock is outside its window, or has been inside for too short a time.
     pub fn is_any_outside(&self) -> bool {
         let samples = self.config.lock_samples;
-        self.nodes.iter().any(|node| self.is_required(node) && node.good < samples)
+        self.nodes.iter().any(|node| self.is_waited_for(node) && node.good < samples)
     }
 
-    /// Whether OP requires that the clock is locked: it answers, and has SYNC signals or follows the reference. A clock
-    /// without SYNC signals in front of the reference receives the host's estimate of the time: it never locks if the
-    /// host sends hundreds of microseconds late, and its time controls nothing.
+    /// Whether OP requires that the clock is locked: it has SYNC signals or follows the reference. A clock without SYNC
+    /// signals in front of the reference receives the host's estimate of the time: it never locks if the host sends
+    /// hundreds of microseconds late, and its time controls nothing.
     pub fn is_required(&self, node: &Node) -> bool {
-        node.has_clock && node.link.is_some() && (node.is_configured || !self.is_in_front(node))
+        node.has_clock && (node.is_configured || !self.is_in_front(node))
+    }
+
+    /// Whether the clock is required and answers: no SubDevice waits for the clock of an absent one.
+    pub fn is_waited_for(&self, node: &Node) -> bool {
+        self.is_required(node) && node.link.is_some()
     }
 
     /// Whether all offsets are being changed.

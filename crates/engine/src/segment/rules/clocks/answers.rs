@@ -28,7 +28,7 @@ impl Segment {
             self.clocks.nodes.iter_mut().zip(differences).zip(required)
         {
             let Some(difference) = difference else {
-                all &= !is_required;
+                all &= !is_required || node.link.is_none();
                 continue;
             };
             // Nothing is written to a reference, so its difference is zero.
