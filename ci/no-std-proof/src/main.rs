@@ -34,6 +34,12 @@ fn panic(_: &PanicInfo) -> ! {
     unsafe { abort() }
 }
 
+/// Named by the tables of functions that came compiled for unwinding with the toolchain, such as the division of
+/// 128 bits in `compiler_builtins`. Nothing unwinds here, so nothing calls it.
+// SAFETY: the only function of this name: a std, which has one too, is refused before anything is linked.
+#[unsafe(no_mangle)]
+pub extern "C" fn rust_eh_personality() {}
+
 /// Called by the start code of the C library; 0 says that codec and engine did what was expected.
 // SAFETY: the only function of this name in the program, with the signature that the start code calls.
 #[unsafe(no_mangle)]
