@@ -286,7 +286,7 @@ impl Supervisor {
 
     /// Counters since the beginning.
     pub fn counters(&self) -> AcyclicCounters {
-        self.shared.borrow().counters
+        self.shared.borrow().counters()
     }
 }
 

@@ -94,6 +94,7 @@ impl From<AcyclicCounters> for run::Acyclic {
             late_copies: counters.late,
             datagrams: counters.datagrams,
             resent_datagrams: counters.resent,
+            dropped_mails: counters.mails_dropped,
             foreign_frames: counters.foreign,
         }
     }
@@ -200,5 +201,8 @@ pub fn final_account(links: &mut WireLinks, supervisor: &SupervisorThread, names
         acyclic.late
     );
     say!("    {} datagrams, {} of them sent again", acyclic.datagrams, acyclic.resent);
+    if acyclic.mails_dropped > 0 {
+        say!("    {} mails dropped: they came after their requests had ended", acyclic.mails_dropped);
+    }
     interfaces
 }

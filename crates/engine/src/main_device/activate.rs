@@ -12,7 +12,7 @@ use super::activate_error::ActivateError;
 use super::active::Active;
 use super::areas::{Areas, Directory};
 use super::declaration::Declaration;
-use super::lay_out::lay_out;
+use super::lay_out::{LaidOut, lay_out};
 use super::live_status::LiveStatus;
 use super::loaded::Loaded;
 use super::obstacles::replaced;
@@ -23,7 +23,7 @@ use crate::config::ClockConfig;
 use crate::declared::SubDeviceId;
 use crate::exchange::{ClockSetup, Exchange};
 use crate::info::SubDeviceInfo;
-use crate::layout::{DomainSpec, Layout, Rules};
+use crate::layout::{Layout, Rules};
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::reconcile::reconcile;
 use crate::procedures::shared_segment::{Beside, SharedSegment};
@@ -55,7 +55,7 @@ impl MainDevice {
         let clock_config = declaration.clocks.clone();
         let plans = plan_all(&declaration, &found)?;
         check_domains(&loaded.declaration, &plans)?;
-        let (specs, layout) = self.lay_out(&declaration, &plans, &found, session)?;
+        let LaidOut { specs, layout, .. } = self.lay_out(&declaration, &plans, &found, session)?;
         let repeats = repeats::of_all(&declaration.subdevices, &plans, &found);
         let sends_again: Vec<bool> = declaration.domains.iter().map(|domain| domain.sends_again).collect();
         let members = members(declaration, found, &plans, &layout)?;
@@ -108,17 +108,17 @@ impl MainDevice {
         plans: &[Areas],
         found: &[Option<Rc<SubDeviceInfo>>],
         session: u32,
-    ) -> Result<(Vec<DomainSpec>, Layout), ActivateError> {
+    ) -> Result<LaidOut, ActivateError> {
         let (links, supervision) = (self.options.links(), self.options.supervision);
         let max_datagrams = self.options.most_datagrams();
+        let rules = Rules { links, supervision, lrw: declaration.lrw, witnesses: &[], session, max_datagrams };
+        let laid_out = lay_out(declaration, plans, found, rules)?;
         #[cfg(feature = "standby")]
-        if self.is_lrw_refused(super::lrw::policy(declaration.lrw, &declaration.explicit_lrw, links)?) {
+        if self.is_lrw_refused(laid_out.lrw) {
             return Err(ActivateError::LrwWithStandby);
         }
-        let rules = Rules { links, supervision, lrw: declaration.lrw, witnesses: &[], session, max_datagrams };
-        let (specs, layout) = lay_out(declaration, plans, found, rules)?;
-        self.memories.check(&layout)?;
-        Ok((specs, layout))
+        self.memories.check(&laid_out.layout)?;
+        Ok(laid_out)
     }
 
     /// Reports that the SubDevice declared as the reference clock has no clock.

@@ -9,7 +9,15 @@ use super::declaration::Declaration;
 use super::lrw::{self, check_lrw};
 use super::prepare::{domain_specs, witnesses};
 use crate::info::SubDeviceInfo;
-use crate::layout::{DomainSpec, Layout, Rules};
+use crate::layout::{DomainSpec, Layout, LrwPolicy, Rules};
+
+/// The domains of a declaration on a segment.
+pub(super) struct LaidOut {
+    /// Where LRW is used.
+    pub lrw: LrwPolicy,
+    pub specs: Vec<DomainSpec>,
+    pub layout: Layout,
+}
 
 /// The domains, and the places of their process data. The declaration replaces the policy of LRW and the witnesses in
 /// `rules`.
@@ -18,7 +26,7 @@ pub(super) fn lay_out(
     plans: &[Areas],
     found: &[Option<Rc<SubDeviceInfo>>],
     rules: Rules<'_>,
-) -> Result<(Vec<DomainSpec>, Layout), ActivateError> {
+) -> Result<LaidOut, ActivateError> {
     let lrw = lrw::policy(declaration.lrw, &declaration.explicit_lrw, rules.links)?;
     let specs = domain_specs(declaration, plans, lrw, rules.links)?;
     check_lrw(lrw, &specs, rules.links)?;
@@ -28,5 +36,5 @@ pub(super) fn lay_out(
     if declaration.clocks.is_some() {
         layout.add_clocks().map_err(ActivateError::Layout)?;
     }
-    Ok((specs, layout))
+    Ok(LaidOut { lrw, specs, layout })
 }

@@ -10,7 +10,7 @@ use ringcat_wire::address::Position;
 
 use super::activate_error::ActivateError;
 use super::declaration::Declaration;
-use super::lay_out::lay_out;
+use super::lay_out::{LaidOut, lay_out};
 use super::loaded::{check_connections, closing};
 use super::prepare::{check, check_domains, no_clock, plan_all, with_domain};
 use crate::config::{ReferenceClock, Resolution, resolve};
@@ -24,8 +24,9 @@ use crate::segment::setup::Setup;
 /// Everything with which [`MainDevice::activate`](super::MainDevice::activate) would refuse a declaration on the
 /// SubDevices of a scan, and SYNC signals that only prevent OP of their own SubDevice. Not contained are missing
 /// SubDevices and SubDevices of another type ([`resolve`]), process data that a SubDevice cannot have
-/// ([`plan`](crate::plan)), and closing cables that are not there, which only a test on the bus shows
-/// ([`MainDevice::start_connection_check`](super::MainDevice::start_connection_check)).
+/// ([`plan`](crate::plan)), closing cables that are not there, which only a test on the bus shows
+/// ([`MainDevice::start_connection_check`](super::MainDevice::start_connection_check)), and what depends on the
+/// options of a MainDevice: memory for images, fewer datagrams per frame, the refusals beside a standby.
 pub fn obstacles(
     declaration: &Declaration,
     (mode, connections): (JunctionMode, &[JunctionConnection]),
@@ -47,7 +48,7 @@ pub fn obstacles(
         Rules { links, supervision: true, lrw: declaration.lrw, witnesses: &[], session: 0, max_datagrams: None };
     match lay_out(&with_domain(declaration.clone()), &plans, &found, rules) {
         Err(error) => obstacles.push(error),
-        Ok((_, layout)) => {
+        Ok(LaidOut { layout, .. }) => {
             for (index, (config, info)) in declaration.subdevices.iter().zip(&found).enumerate() {
                 let Some(info) = info.as_ref().filter(|_| plans[index].unfit().is_none()) else { continue };
                 let subdevice = SubDeviceId(index);

@@ -213,6 +213,8 @@ plain! {
         pub resent: u64,
         /// Datagrams that were given up.
         pub timed_out: u64,
+        /// Mails that no request waited for and that were not fetched in time: lost answers.
+        pub mails_dropped: u64,
     }
 }
 
@@ -367,6 +369,7 @@ fn cable_snapshot(cable: Cable, errors: [u64; 2]) -> CableSnapshot {
 }
 
 fn acyclic_snapshot(counters: AcyclicCounters) -> AcyclicSnapshot {
-    let AcyclicCounters { sent, received, lost, corrupt, foreign, datagrams, resent, timed_out, .. } = counters;
-    AcyclicSnapshot { sent, received, lost, corrupt, foreign, datagrams, resent, timed_out }
+    let AcyclicCounters { sent, received, lost, corrupt, foreign, datagrams, resent, timed_out, mails_dropped, .. } =
+        counters;
+    AcyclicSnapshot { sent, received, lost, corrupt, foreign, datagrams, resent, timed_out, mails_dropped }
 }

@@ -97,13 +97,16 @@ fn orders(segment: &SharedSegment, station: StationAddress) -> Option<(u32, u32)
 /// Writes settings, all in one frame: a second frame would be sent into a closed port. An error if a SubDevice is not
 /// reached.
 pub(super) async fn write(bus: &Bus, controls: Vec<(StationAddress, DlControl)>) -> Result<(), BusError> {
+    write_together(bus, controls.into_iter().map(write_of).collect()).await
+}
+
+/// The same with datagrams of any length, each of which addresses one SubDevice.
+pub(super) async fn write_together(bus: &Bus, writes: Vec<(Command, Target, Vec<u8>)>) -> Result<(), BusError> {
     let expected = Wkc(1);
-    let replies = bus.transfer_all(controls.iter().copied().map(write_of), Some(expected)).await?;
-    match controls.iter().zip(&replies).find(|(_, reply)| reply.wkc() != expected) {
-        Some(((station, _), reply)) => {
-            let target = Target::Station(*station, map::DL_CONTROL);
-            Err(BusError::Wkc { target, expected, got: reply.wkc() })
-        }
+    let targets: Vec<Target> = writes.iter().map(|(_, target, _)| *target).collect();
+    let replies = bus.transfer_together(writes, Some(expected)).await?;
+    match targets.into_iter().zip(&replies).find(|(_, reply)| reply.wkc() != expected) {
+        Some((target, reply)) => Err(BusError::Wkc { target, expected, got: reply.wkc() }),
         None => Ok(()),
     }
 }

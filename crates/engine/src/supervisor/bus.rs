@@ -90,7 +90,7 @@ impl Bus {
 
     /// Counters of the acyclic half.
     pub(crate) fn counters(&self) -> AcyclicCounters {
-        self.shared.borrow().counters
+        self.shared.borrow().counters()
     }
 
     /// Posts an AL status that was read, for readers of the live status.

@@ -30,6 +30,8 @@ pub struct AcyclicCounters {
     pub resent: u64,
     /// Datagrams that were given up because their frame was lost.
     pub timed_out: u64,
+    /// Mails that came when no request waited for them any more, and were not fetched in time: lost answers.
+    pub mails_dropped: u64,
 }
 
 impl AcyclicCounters {
@@ -50,6 +52,7 @@ impl AcyclicCounters {
             datagrams: self.datagrams + other.datagrams,
             resent: self.resent + other.resent,
             timed_out: self.timed_out + other.timed_out,
+            mails_dropped: self.mails_dropped + other.mails_dropped,
         }
     }
 }

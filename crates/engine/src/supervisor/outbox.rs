@@ -88,10 +88,15 @@ impl Outbox {
     /// The next datagram; `reads`: the frame may hold reads. Later datagrams do not overtake it, except urgent ones, of
     /// which [`URGENT_IN_A_ROW`] are sent for each other one that waits.
     pub(crate) fn front(&self, reads: bool, now: Instant) -> Option<(TransferId, Rank)> {
-        let urgent = self.urgent.front().map(|id| (*id, Rank::Urgent));
+        let urgent = self.front_of_urgent();
         let is_others_turn = || urgent.is_none() || self.urgent_in_a_row >= URGENT_IN_A_ROW;
         let other = is_others_turn().then(|| self.front_of_others(reads, now)).flatten();
         other.or(urgent)
+    }
+
+    /// The next urgent datagram: one of a group that is being packed is not passed by others.
+    pub(crate) fn front_of_urgent(&self) -> Option<(TransferId, Rank)> {
+        self.urgent.front().map(|id| (*id, Rank::Urgent))
     }
 
     fn front_of_others(&self, reads: bool, now: Instant) -> Option<(TransferId, Rank)> {

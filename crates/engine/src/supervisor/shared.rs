@@ -175,6 +175,11 @@ impl Shared {
         timer
     }
 
+    /// Frames, datagrams and mails so far.
+    pub(super) fn counters(&self) -> AcyclicCounters {
+        AcyclicCounters { mails_dropped: self.strays.dropped(), ..self.counters }
+    }
+
     /// Whether there is work that does not wait for a time: a datagram to send, or a request to the link layer.
     pub(super) fn has_work(&self) -> bool {
         self.link_order.is_some() || self.wants_to_send()

@@ -2,6 +2,7 @@
 
 mod budget;
 mod copies;
+mod together;
 
 use alloc::rc::Rc;
 use alloc::vec;

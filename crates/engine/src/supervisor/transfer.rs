@@ -12,6 +12,18 @@ use super::reply::{BusError, Reply};
 use super::task::TaskId;
 use crate::time::Instant;
 
+/// What of a group of requests follows one of them in the same frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Rest {
+    pub bytes: usize,
+    pub datagrams: usize,
+}
+
+impl Rest {
+    /// The last one of a group, or alone.
+    pub(super) const NONE: Rest = Rest { bytes: 0, datagrams: 0 };
+}
+
 /// A request to the bus.
 #[derive(Clone, Debug)]
 pub(crate) struct Request {
@@ -36,6 +48,8 @@ pub(crate) struct Request {
     pub polls: bool,
     /// It is sent before all datagrams that wait.
     pub urgent: bool,
+    /// The datagrams that follow in the same frame ([`super::Bus::transfer_together`]).
+    pub rest: Rest,
     /// Number of further datagrams of the same kind before it, in a frame of their own.
     pub before: usize,
     /// Set if no other frame may be on the wire with it: the links on which copies are known not to return, a bit each.
@@ -60,6 +74,7 @@ impl Request {
             mail: None,
             polls: false,
             urgent: false,
+            rest: Rest::NONE,
             before: 0,
             alone: None,
             time_at: None,
@@ -88,6 +103,11 @@ impl Request {
     pub(super) fn bytes(&self) -> usize {
         let preceding = self.preceding.as_ref().map_or(0, |(_, _, data)| OVERHEAD + data.len());
         preceding + (1 + self.before) * (OVERHEAD + self.data.len())
+    }
+
+    /// It and the rest of its group in a frame.
+    pub(super) fn group(&self) -> Rest {
+        Rest { bytes: self.bytes() + self.rest.bytes, datagrams: self.datagrams() + self.rest.datagrams }
     }
 
     /// A read of the SubDevice that ARMW and FRMW address. It shows which copy reaches that SubDevice; the working

@@ -169,7 +169,7 @@ async fn set_loops(
     wanted: &Ring,
 ) -> Result<bool, BusError> {
     for number in 0..TRIES {
-        let replies = bus.transfer_all(loops(segment, rings, &sides), Some(Wkc(1))).await?;
+        let replies = bus.transfer_together(loops(segment, rings, &sides), Some(Wkc(1))).await?;
         let mut all = rings.iter().zip(&replies);
         // The first frame took the path of the previous loops.
         if number > 0 && all.any(|(ring, reply)| ring.head == wanted.head && reply.wkc() == Wkc(1)) {

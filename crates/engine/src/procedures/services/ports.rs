@@ -5,13 +5,15 @@ pub use crate::segment::BlockedPort;
 use alloc::vec::Vec;
 
 use ringcat_wire::address::StationAddress;
+use ringcat_wire::command::Command;
+use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlControl, LoopControl, map};
 
 use super::ServiceError;
 use crate::declared::SubDeviceId;
 use crate::order::InOrder;
 use crate::procedures::junction::ordering;
-use crate::procedures::loops::{LOOPS, lasting};
+use crate::procedures::loops::{LOOPS, lasting, write_together};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::ring::RingState;
 use crate::segment::Observation;
@@ -110,11 +112,8 @@ async fn set_all(
     }
     let order = |(station, loops): &(StationAddress, u8)| ordering(segment, *station, LOOPS, &[*loops]);
     let _orders: Vec<_> = writes.iter().map(order).collect();
-    let write = |bus: Bus, (station, loops)| async move { bus.fpwr(station, LOOPS, &[loops]).await };
-    for written in bus.gather(writes, write).await {
-        written?;
-    }
-    Ok(())
+    let write = |(station, loops)| (Command::Fpwr, Target::Station(station, LOOPS), Vec::from([loops]));
+    Ok(write_together(bus, writes.into_iter().map(write).collect()).await?)
 }
 
 /// The ports of its neighbours that are connected to a SubDevice.

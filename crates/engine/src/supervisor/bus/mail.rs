@@ -62,9 +62,4 @@ impl Bus {
     pub(crate) fn has_stray_mails(&self) -> bool {
         self.shared.borrow().strays.has_any()
     }
-
-    /// Number of stray mails of all SubDevices that were not fetched in time.
-    pub fn stray_mails_dropped(&self) -> u64 {
-        self.shared.borrow().strays.dropped()
-    }
 }

@@ -13,7 +13,7 @@ use ringcat_wire::datagram::Target;
 use super::Bus;
 use super::future::TransferFuture;
 use crate::supervisor::reply::{BusError, Elapsed, Reply};
-use crate::supervisor::transfer::Request;
+use crate::supervisor::transfer::{Request, Rest};
 use crate::time::Instant;
 
 impl Bus {
@@ -84,16 +84,47 @@ impl Bus {
         .await
     }
 
-    /// Sends datagrams together, in one frame if they fit, and waits for all replies; returns the first error.
+    /// Sends datagrams one after another, others that wait may come between, and waits for all replies; returns the
+    /// first error.
     pub async fn transfer_all(
         &self,
         datagrams: impl IntoIterator<Item = (Command, Target, Vec<u8>)>,
         expected: Option<Wkc>,
     ) -> Result<Vec<Reply>, BusError> {
-        let mut waiting: Vec<TransferFuture> = Vec::new();
-        for (command, target, data) in datagrams {
-            waiting.push(self.submit(Request { expected, resend: true, ..Request::once(command, target, data) }));
+        let requests = datagrams.into_iter().map(|(command, target, data)| Request {
+            expected,
+            resend: true,
+            ..Request::once(command, target, data)
+        });
+        self.replies(requests).await
+    }
+
+    /// Sends datagrams in one frame, before all that wait, and again in one frame if it is lost; waits for all replies
+    /// and returns the first error. What is longer than a frame, or than [`Bus::max_datagrams`], takes several.
+    pub(crate) async fn transfer_together(
+        &self,
+        datagrams: impl IntoIterator<Item = (Command, Target, Vec<u8>)>,
+        expected: Option<Wkc>,
+    ) -> Result<Vec<Reply>, BusError> {
+        let mut requests: Vec<Request> = datagrams
+            .into_iter()
+            .map(|(command, target, data)| Request {
+                expected,
+                resend: true,
+                urgent: true,
+                ..Request::once(command, target, data)
+            })
+            .collect();
+        let mut rest = Rest::NONE;
+        for request in requests.iter_mut().rev() {
+            request.rest = rest;
+            rest = request.group();
         }
+        self.replies(requests).await
+    }
+
+    async fn replies(&self, requests: impl IntoIterator<Item = Request>) -> Result<Vec<Reply>, BusError> {
+        let mut waiting: Vec<TransferFuture> = requests.into_iter().map(|request| self.submit(request)).collect();
         let mut results: Vec<Option<Result<Reply, BusError>>> = waiting.iter().map(|_| None).collect();
         poll_fn(|context| {
             for (future, result) in waiting.iter_mut().zip(&mut results) {

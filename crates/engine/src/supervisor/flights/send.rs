@@ -11,9 +11,9 @@ use crate::link::{Link, LinkSet};
 use crate::ring::identity::DATAGRAMS_AT;
 use crate::ring::{Class, Identity};
 use crate::supervisor::flight::{Flight, SentDatagram};
-use crate::supervisor::outbox::Rank;
+use crate::supervisor::outbox::{Outbox, Rank};
 use crate::supervisor::shared::Shared;
-use crate::supervisor::transfer::{Request, Stage, TransferId, WITNESS_BYTES};
+use crate::supervisor::transfer::{Request, Rest, Stage, TransferId, WITNESS_BYTES};
 use crate::time::Instant;
 
 /// A datagram that fits no send window is sent after this time nevertheless, and delays one cycle.
@@ -79,9 +79,13 @@ impl Shared {
         let length = {
             let source = self.identity.source();
             let mut builder = FrameBuilder::ethernet(&mut self.flights.buffer, MacAddress::ETHERCAT_GROUP, source)?;
-            let (mut total, mut datagrams, mut is_alone) = (DATAGRAMS_AT, 0, false);
+            let (mut total, mut datagrams, mut is_alone, mut follows) = (DATAGRAMS_AT, 0, false, false);
             let reads = self.outbox.may_read(self.now);
-            while let Some((id, rank)) = self.outbox.front(reads, self.now) {
+            let front = |outbox: &Outbox, now, follows| match follows {
+                true => outbox.front_of_urgent(),
+                false => outbox.front(reads, now),
+            };
+            while let Some((id, rank)) = front(&self.outbox, self.now, follows) {
                 let Some(transfer) = self.transfers.find(id) else {
                     self.outbox.pop(rank);
                     continue;
@@ -89,25 +93,28 @@ impl Shared {
                 if transfer.abandoned {
                     self.outbox.pop(rank);
                     self.transfers.remove(id);
+                    // So is the rest of its group.
+                    follows = false;
                     continue;
                 }
                 let request = &transfer.request;
-                let bytes = request.bytes();
-                let fills_up = is_alone || request.before > 0 || datagrams + request.datagrams() > self.max_datagrams;
+                let group = request.group();
+                let fills_up = is_alone || request.before > 0 || datagrams + group.datagrams > self.max_datagrams;
                 if fills_up && !flight.datagrams.is_empty() {
                     break;
                 }
-                // Only the first datagram of a frame may be longer than the window.
-                if (total + bytes).max(MIN_FRAME) > limit
+                // Only the first datagram of a frame, with its group, may be longer than the window.
+                if !follows
+                    && (total + group.bytes).max(MIN_FRAME) > limit
                     && (!flight.datagrams.is_empty() || !Shared::is_starved(&mut self.blocked, id, self.now))
                 {
                     break;
                 }
                 let index = sequence.index(Class::Acyclic);
-                is_alone = request.before > 0;
+                (is_alone, follows) = (request.before > 0, request.rest != Rest::NONE);
                 let Some(data_at) = put(&mut builder, request, index, self.now) else { break };
-                total += bytes;
-                datagrams += request.datagrams();
+                let bytes = request.bytes();
+                (total, datagrams) = (total + bytes, datagrams + request.datagrams());
                 retry = retry.max(transfer.retries);
                 flight.repeatable &= request.resend;
                 flight.datagrams.push(SentDatagram::new(id, request, data_at));
