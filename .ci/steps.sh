@@ -16,7 +16,7 @@ root_layer() {
         apt-get update -q
         DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends "${missing[@]}"
     elif [[ ${CI:-} == true ]]; then
-        echo "not installed, and only root can install them: ${missing[*]}: what they show would be skipped without a word"
+        echo "not installed, and only root can install them: ${missing[*]}; the checks that need them would be skipped"
         return 1
     else
         echo "skipped: not installed: ${missing[*]}; without valgrind instruction counts are missing, without iproute2"

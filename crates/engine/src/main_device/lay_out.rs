@@ -14,6 +14,7 @@ use crate::layout::{DomainSpec, Layout, LrwPolicy, Rules};
 /// The domains of a declaration on a segment.
 pub(super) struct LaidOut {
     /// Where LRW is used.
+    #[cfg(feature = "standby")]
     pub lrw: LrwPolicy,
     pub specs: Vec<DomainSpec>,
     pub layout: Layout,
@@ -36,5 +37,10 @@ pub(super) fn lay_out(
     if declaration.clocks.is_some() {
         layout.add_clocks().map_err(ActivateError::Layout)?;
     }
-    Ok(LaidOut { lrw, specs, layout })
+    Ok(LaidOut {
+        #[cfg(feature = "standby")]
+        lrw,
+        specs,
+        layout,
+    })
 }

@@ -10,6 +10,7 @@ mod clients;
 mod ends;
 mod handover;
 mod hostile;
+mod install;
 mod lines;
 mod locks;
 mod outputs;

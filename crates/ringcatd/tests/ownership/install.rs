@@ -1,0 +1,257 @@
+//! `packaging/install`: which files come where, what stays of an edited configuration, what is left after its removal.
+
+use std::collections::BTreeSet;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use crate::bench::directory;
+
+fn script() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../packaging/install")
+}
+
+/// The root of a package, and programs to install there: scripts in place of those that a release has.
+struct Root {
+    directory: PathBuf,
+}
+
+impl Root {
+    fn new() -> Root {
+        let directory = directory();
+        let shell = directory.join("programs/shell");
+        std::fs::create_dir_all(shell.join("man8")).expect("it can be made");
+        for program in ["ringcat", "ethercat", "ringcatd", "ethercatctl"] {
+            std::fs::copy("/bin/sleep", directory.join("programs").join(program)).expect("sleep is there");
+        }
+        for file in ["man8/ethercat.8", "man8/ethercat-slaves.8", "ethercat.bash", "_ethercat", "ethercat.fish"] {
+            std::fs::write(shell.join(file), file).expect("it can be written");
+        }
+        Root { directory }
+    }
+
+    fn path(&self, path: &str) -> PathBuf {
+        self.directory.join("root").join(path.trim_start_matches('/'))
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        let mut install = Command::new(script());
+        install.env_remove("PREFIX").env_remove("DESTDIR").arg("--destdir").arg(self.path("/")).args(arguments);
+        install.output().expect("sh is there")
+    }
+
+    /// Installs without the libraries, whose own tests are those of `crates/ffi`.
+    fn install(&self, arguments: &[&str]) -> String {
+        let programs = self.directory.join("programs");
+        let mut all = vec!["--programs", programs.to_str().expect("text"), "--without-library"];
+        all.extend(arguments);
+        said(&self.run(&all), true)
+    }
+
+    /// All files, with their places below the root.
+    fn files(&self) -> BTreeSet<String> {
+        let mut files = BTreeSet::new();
+        let mut left = vec![self.path("/")];
+        while let Some(directory) = left.pop() {
+            for entry in std::fs::read_dir(&directory).into_iter().flatten().flatten() {
+                let path = entry.path();
+                if path.is_dir() {
+                    left.push(path);
+                } else {
+                    let place = path.strip_prefix(self.path("/")).expect("it is below");
+                    files.insert(format!("/{}", place.display()));
+                }
+            }
+        }
+        files
+    }
+
+    fn text(&self, path: &str) -> String {
+        std::fs::read_to_string(self.path(path)).expect(path)
+    }
+}
+
+impl Drop for Root {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.directory);
+    }
+}
+
+fn said(output: &Output, succeeds: bool) -> String {
+    let said = String::from_utf8_lossy(&[&output.stdout[..], &output.stderr].concat()).into_owned();
+    assert_eq!(output.status.success(), succeeds, "{said}");
+    said
+}
+
+const OF_A_DISTRIBUTION: [&str; 21] = [
+    "/etc/ethercat.conf",
+    "/etc/security/limits.d/ethercat.conf",
+    "/usr/bin/ethercat",
+    "/usr/bin/ringcat",
+    "/usr/lib/systemd/system/ethercat.service",
+    "/usr/lib/systemd/system/ringcat-standby@.service",
+    "/usr/lib/sysusers.d/ethercat.conf",
+    "/usr/lib/tmpfiles.d/ethercat.conf",
+    "/usr/lib/udev/rules.d/99-ethercat.rules",
+    "/usr/sbin/ethercatctl",
+    "/usr/sbin/ringcatd",
+    "/usr/share/bash-completion/completions/ethercat",
+    "/usr/share/doc/ringcat/CHANGELOG.md",
+    "/usr/share/doc/ringcat/LICENSE-APACHE",
+    "/usr/share/doc/ringcat/LICENSE-MIT",
+    "/usr/share/doc/ringcat/ringcat-standby.conf",
+    "/usr/share/fish/vendor_completions.d/ethercat.fish",
+    "/usr/share/man/man8/ethercat-slaves.8",
+    "/usr/share/man/man8/ethercat.8",
+    "/usr/share/ringcat/installed",
+    "/usr/share/zsh/vendor-completions/_ethercat",
+];
+
+// covers: daemon
+#[test]
+fn all_files_come_to_the_places_of_a_distribution_and_nothing_is_left_of_them() {
+    let root = Root::new();
+    let about = root.install(&["--prefix", "/usr"]);
+    let expected: BTreeSet<String> = OF_A_DISTRIBUTION.iter().map(ToString::to_string).collect();
+    assert_eq!(root.files(), expected);
+    assert!(about.contains("20 files") && !about.contains("next:"), "{about}");
+    // The list of the files is the only one that is not counted.
+    assert_eq!(expected.len(), 21);
+    said(&root.run(&["--prefix", "/usr", "--uninstall"]), true);
+    assert!(!root.path("/").exists(), "{:?}", root.files());
+    let again = said(&root.run(&["--prefix", "/usr", "--uninstall"]), false);
+    assert!(again.contains("nothing is installed here"), "{again}");
+}
+
+// covers: daemon
+#[test]
+fn what_files_name_is_installed_with_every_prefix() {
+    for (prefix, init, units) in [
+        ("/usr", "systemd", "/usr/lib/systemd/system"),
+        ("/usr/local", "systemd", "/usr/local/lib/systemd/system"),
+        ("/opt/etherlab", "systemd", "/usr/local/lib/systemd/system"),
+        ("/opt/etherlab", "sysv", ""),
+    ] {
+        let root = Root::new();
+        root.install(&["--prefix", prefix, "--init", init]);
+        let texts: Vec<String> = match init {
+            "systemd" => ["ethercat.service", "ringcat-standby@.service"]
+                .map(|unit| root.text(&format!("{units}/{unit}")))
+                .into_iter()
+                .collect(),
+            _ => vec![root.text("/etc/init.d/ethercat"), root.text("/etc/sysconfig/ethercat")],
+        };
+        let words = texts.iter().flat_map(|text| text.split(|it: char| it.is_whitespace() || it == '='));
+        let named: BTreeSet<&str> = words.filter(|word| word.contains("bin/") && word.starts_with('/')).collect();
+        let expected = if init == "systemd" { 2 } else { 1 };
+        let named: Vec<&str> = named.into_iter().filter(|program| *program != "/bin/sh").collect();
+        assert_eq!(named.len(), expected, "{named:?}");
+        assert!(named.iter().all(|program| root.path(program).exists() && program.starts_with(prefix)), "{named:?}");
+    }
+}
+
+// covers: daemon
+#[test]
+fn every_place_can_be_chosen() {
+    let root = Root::new();
+    let places = [
+        ("--bindir", "ringcat"),
+        ("--sbindir", "ringcatd"),
+        ("--mandir", "man8/ethercat.8"),
+        ("--datadir", "doc/ringcat/CHANGELOG.md"),
+        ("--sysconfdir", "ethercat.conf"),
+        ("--unitdir", "ethercat.service"),
+        ("--sysusersdir", "ethercat.conf"),
+        ("--tmpfilesdir", "ethercat.conf"),
+        ("--udevdir", "99-ethercat.rules"),
+    ];
+    let paths: Vec<String> = places.iter().map(|(option, _)| format!("/a{}", option.replace("--", "/"))).collect();
+    let options: Vec<&str> = places.iter().zip(&paths).flat_map(|((option, _), path)| [*option, path]).collect();
+    root.install(&options);
+    for ((_, file), path) in places.iter().zip(&paths) {
+        assert!(root.path(path).join(file).exists(), "{path}/{file}: {:?}", root.files());
+    }
+    assert!(root.files().iter().all(|file| file.starts_with("/a/")), "{:?}", root.files());
+    assert!(
+        root.text("/a/unitdir/ethercat.service").contains("=/a/sbindir/ringcatd --conf /a/sysconfdir/ethercat.conf")
+    );
+    said(&root.run(&["--datadir", "/a/datadir", "--uninstall"]), true);
+    assert!(!root.path("/").exists(), "{:?}", root.files());
+}
+
+// covers: daemon
+#[test]
+fn an_edited_configuration_outlives_a_new_version_and_a_removal_but_no_purge() {
+    let root = Root::new();
+    root.install(&["--prefix", "/usr"]);
+    let (conf, new) = ("/etc/ethercat.conf", "/etc/ethercat.conf.new");
+    let edited = root.text(conf).replace("MASTER0_DEVICE=\"\"", "MASTER0_DEVICE=\"eth1\"");
+    std::fs::write(root.path(conf), &edited).expect("it can be written");
+    for _ in 0..2 {
+        let about = root.install(&["--prefix", "/usr"]);
+        assert!(about.contains("kept, because it was edited"), "{about}");
+        assert_eq!((root.text(conf), root.path(new).exists()), (edited.clone(), true));
+    }
+    let about = said(&root.run(&["--prefix", "/usr", "--uninstall"]), true);
+    assert!(about.contains("edited files that are left: 1"), "{about}");
+    let left = ["/etc/ethercat.conf", "/usr/share/ringcat/installed"].map(String::from);
+    assert_eq!((root.files(), root.text(conf)), (BTreeSet::from(left), edited.clone()));
+    // As an application that comes back after its removal.
+    root.install(&["--prefix", "/usr"]);
+    assert_eq!(root.text(conf), edited);
+    said(&root.run(&["--prefix", "/usr", "--uninstall"]), true);
+    said(&root.run(&["--prefix", "/usr", "--uninstall", "--purge"]), true);
+    assert!(!root.path("/").exists(), "{:?}", root.files());
+}
+
+// covers: daemon
+#[test]
+fn files_of_others_stay_and_those_of_an_older_version_go() {
+    let root = Root::new();
+    for place in ["/usr/bin", "/usr/lib/udev/rules.d"] {
+        std::fs::create_dir_all(root.path(place)).expect("it can be made");
+        std::fs::write(root.path(place).join("other"), "").expect("it can be written");
+    }
+    root.install(&["--prefix", "/usr"]);
+    // The older version had a page more.
+    std::fs::remove_file(root.directory.join("programs/shell/man8/ethercat-slaves.8")).expect("it is there");
+    root.install(&["--prefix", "/usr"]);
+    assert!(!root.path("/usr/share/man/man8/ethercat-slaves.8").exists());
+    said(&root.run(&["--prefix", "/usr", "--uninstall"]), true);
+    assert_eq!(root.files(), BTreeSet::from(["/usr/bin/other", "/usr/lib/udev/rules.d/other"].map(String::from)));
+}
+
+// covers: daemon
+#[test]
+fn a_program_that_runs_keeps_its_file_when_a_new_version_comes() {
+    let root = Root::new();
+    root.install(&["--prefix", "/usr"]);
+    let program = root.path("/usr/sbin/ringcatd");
+    let inode = || std::fs::metadata(&program).expect("it is there").ino();
+    let before = inode();
+    let mut running = Command::new(&program).arg("60").spawn().expect("it is a program");
+    root.install(&["--prefix", "/usr"]);
+    let runs = matches!(running.try_wait(), Ok(None));
+    running.kill().expect("it is ours");
+    running.wait().expect("it was ended");
+    assert!(runs && inode() != before);
+}
+
+// covers: daemon
+#[test]
+fn wrong_options_of_an_installation_are_named_and_nothing_is_written() {
+    let root = Root::new();
+    for (arguments, expected) in [
+        (&["--prefix", "opt"][..], "not an absolute path: opt"),
+        (&["--bindir", "/a b"], "a path with a space: /a b"),
+        (&["--init", "upstart"], "--init is systemd, sysv or none"),
+        (&["--prefix"], "--prefix needs a value"),
+        (&["--force"], "unknown option: --force"),
+    ] {
+        let output = root.run(arguments);
+        let about = said(&output, false);
+        assert!(about.contains(expected) && output.status.code() == Some(2), "{about}");
+    }
+    assert!(root.files().is_empty());
+    assert!(said(&root.run(&["--help"]), true).contains("packaging/install --uninstall"));
+}
