@@ -8,9 +8,9 @@ use ringcat_wire::mailbox::coe::pdo_objects::is_mapping;
 /// An object with a count at subindex 0.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct PdoList {
-    /// `None` if it is not known.
+    /// Value of subindex 0; `None` if it is not known.
     count: Option<u8>,
-    /// By subindex.
+    /// Known entries by subindex.
     entries: BTreeMap<u8, u32>,
 }
 

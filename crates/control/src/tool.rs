@@ -196,8 +196,8 @@ pub enum ToolAnswer {
 /// A piece of a list.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Piece<T> {
-    /// Number of all.
+    /// Number of entries of the whole list.
     pub total: u32,
-    /// Those of this piece.
+    /// Entries of this piece.
     pub these: Vec<T>,
 }

@@ -51,7 +51,7 @@ pub enum TapError {
     Refused {
         /// The interface.
         name: String,
-        /// Why.
+        /// Reason of the refusal.
         cause: String,
     },
     /// Another system call error.

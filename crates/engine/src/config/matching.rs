@@ -49,7 +49,7 @@ enum Mark {
 }
 
 impl Mark {
-    /// The mark that an address refers to; `None` for a position, and for alias 0, which means a position.
+    /// The identifier that an address refers to; `None` for a position, and for alias 0, which means a position.
     const fn of(address: ConfigAddress) -> Option<Mark> {
         match address {
             ConfigAddress::Alias { alias: 0, .. } | ConfigAddress::Position(_) => None,

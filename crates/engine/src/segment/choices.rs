@@ -9,7 +9,8 @@ pub enum Retries {
     /// It is repeated after pauses of 100 ms to 5 s, without end; after a loss of frames the first pauses are shorter.
     #[default]
     Always,
-    /// The SubDevice stays as it is until a retry is requested. Losses of frames are repeated at any rate.
+    /// The SubDevice stays as it is until a retry is requested. An attempt that failed because frames were lost is
+    /// repeated in any case.
     OnRequest,
 }
 

@@ -34,7 +34,7 @@ impl Scan {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Found {
-    /// By position.
+    /// SubDevices by position.
     pub subdevices: Vec<Rc<SubDeviceInfo>>,
     /// Their connections.
     pub topology: Topology,

@@ -42,7 +42,7 @@ pub enum IdleObservation<'a> {
     /// The scan under way reads EEPROMs from now on; addresses for which it has found that no SubDevice, or several,
     /// have them.
     ReadingBegun(&'a [StationAddress]),
-    /// It no longer does.
+    /// The scan under way reads no further EEPROMs.
     ReadingEnded,
     /// The ring is about to be opened for a measurement: broadcasts show nothing of the segment until it has ended.
     Measuring,
