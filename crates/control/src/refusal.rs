@@ -12,9 +12,9 @@ use crate::owner::Owner;
 pub enum Refusal {
     /// The versions differ.
     Version {
-        /// That of the side that refuses.
+        /// Version of the side that refuses.
         here: u16,
-        /// That of the message.
+        /// Version of the message.
         there: u16,
     },
     /// The client may only read.
@@ -123,7 +123,7 @@ impl fmt::Display for Refusal {
             Refusal::Fault { master, cause } => write!(f, "master {master} is not driven: {cause}"),
             Refusal::Failed(cause) => f.write_str(cause),
             Refusal::Unexpected { expected } => write!(f, "expected {expected}"),
-            Refusal::TooManyClients { limit } => write!(f, "ringcatd has {limit} clients, which is the most it serves"),
+            Refusal::TooManyClients { limit } => write!(f, "ringcatd has the maximum number of clients: {limit}"),
             Refusal::TooManyQueries { master, owner } => {
                 write!(f, "master {master}: {owner} drives it and has the maximum number of pending queries or bytes")
             }

@@ -20,9 +20,9 @@ const MAGIC: [u8; 4] = *b"RCTL";
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Limits {
-    /// Of the content, in bytes.
+    /// Longest content, in bytes.
     pub content: usize,
-    /// Of its data, in bytes.
+    /// Longest data after it, in bytes.
     pub bytes: usize,
 }
 

@@ -414,9 +414,9 @@ pub enum Event {
         target: Target,
         /// Expected.
         expected: Wkc,
-        /// That of the last one.
+        /// Working counter of the last of these datagrams.
         got: Wkc,
-        /// Their number since the last report.
+        /// Number of these datagrams since the last report.
         count: u32,
     },
     /// A domain was due while its previous frames were still on the wire.

@@ -18,12 +18,12 @@ pub enum Retries {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ReadPdos {
-    /// None.
+    /// No dictionaries.
     Never,
-    /// Those of SubDevices whose SII assigns no PDO to a SyncManager for process data that is in use.
+    /// Dictionaries of SubDevices whose SII assigns no PDO to a SyncManager for process data that is in use.
     #[default]
     Missing,
-    /// Those of all SubDevices with CoE.
+    /// Dictionaries of all SubDevices with CoE.
     Always,
 }
 

@@ -68,7 +68,7 @@ impl CommandReports {
         Some(wrong)
     }
 
-    /// Those that have waited for an interval.
+    /// Kinds of datagrams that have waited for an interval: to be reported now.
     pub(crate) fn take_waiting(&mut self, now: Instant) -> Vec<WrongCommand> {
         let due = self.kinds.iter_mut().filter_map(|(known, at)| take_due(known, at, now));
         let mut due: Vec<WrongCommand> = due.collect();

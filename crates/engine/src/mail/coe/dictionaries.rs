@@ -158,7 +158,7 @@ impl ObjectDictionary {
                 Ok(entry) => {
                     kept.add(&known, bytes_of_entry(entry), |known| known.keep_entry(entry.clone()));
                 }
-                // Those of PDOs exist or not by what is mapped.
+                // Not for PDO objects: which of their entries exist depends on the current mapping.
                 Err(InformationError::Refused(AbortCode::SUB_INDEX_DOES_NOT_EXIST)) if address.0 >= PROFILE => {
                     kept.add(&known, MISSING_BYTES, |known| known.keep_missing(address));
                 }

@@ -39,7 +39,7 @@ pub struct Clocks {
     pub(in crate::segment) life: Life,
     /// Changes so far.
     pub(in crate::segment) changes: ClockChanges,
-    /// By position of the scan, then later ones.
+    /// Clocks by position of the scan, then clocks that came later.
     pub nodes: Vec<Node>,
     /// The reference.
     pub reference: Option<StationAddress>,

@@ -12,7 +12,7 @@ use crate::ring_status::LinkCounts;
 pub struct Words {
     /// The links in use.
     pub(super) links: LinkSet,
-    /// By [`Link::index`].
+    /// Carriers by [`Link::index`]; `None` where they are not known.
     pub(super) carriers: [Option<bool>; 2],
     /// The state of the ring.
     pub(super) ring: RingWord,
