@@ -21,7 +21,7 @@ impl PdoList {
         PdoList { count: Some(count), entries: (1..=u8::MAX).zip(described).collect() }
     }
 
-    /// After a write.
+    /// The object after this write.
     pub(crate) fn with(mut self, download: &SdoDownload) -> PdoList {
         let SdoDownload { index, sub_index, complete_access, data, .. } = download;
         let size = if is_mapping(*index) { 4 } else { 2 };

@@ -95,7 +95,7 @@ pub enum ToolQuery {
     SiiWrite {
         /// Position of the SubDevice.
         position: u16,
-        /// Also what is no valid image.
+        /// Writes the bytes even if they are no valid image.
         force: bool,
     },
     /// Writes the alias into the SII.
@@ -104,7 +104,7 @@ pub enum ToolQuery {
         position: u16,
         /// The alias; 0 is none.
         alias: u16,
-        /// Also where the checksum was wrong before.
+        /// Writes the alias even if the checksum is wrong.
         force: bool,
     },
     /// Requests a state and does not wait for it: 1 INIT, 2 PREOP, 3 BOOT, 4 SAFEOP, 8 OP.

@@ -147,7 +147,7 @@ impl TapInterface {
 
     /// From now on it exists as long as a process has it.
     pub fn end_with_processes(&self) {
-        // It was removed otherwise.
+        // This fails only if the interface was removed meanwhile.
         let _ = set_lasting(&self.fd, false);
     }
 

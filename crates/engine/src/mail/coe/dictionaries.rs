@@ -252,7 +252,7 @@ impl ObjectDictionary {
         match read(&self.mailbox, SdoAddress::new(SOFTWARE_VERSION, 0), limits, MOST_VERSION).await {
             Ok(version) => Ok(Some(version)),
             Err(error) if matches!(error.cause, SdoFailure::Aborted(_)) => {
-                // Nothing of the application failed.
+                // This read is not one of the application, whose last error must stay.
                 self.mailbox.forget_protocol_error(before);
                 Ok(None)
             }

@@ -33,7 +33,7 @@ pub enum IdleObservation<'a> {
         /// Number of the request that it answers.
         wanted: Option<u64>,
     },
-    /// It has failed; the reason, unless the segment has changed meanwhile.
+    /// The scan after a change has failed; the reason, unless the segment has changed meanwhile.
     NotFollowed(Option<String>),
     /// The states of all SubDevices with a requested state were read.
     StatesRead(&'a [StateRead]),
