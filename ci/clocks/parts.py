@@ -158,7 +158,7 @@ class Units:
     def __init__(self, within=None):
         # By station: of which group, and nanoseconds from where the frame comes in to the first of that group.
         self.units = {}
-        # Behind forks without a clock: group and time in front of it, each group there with its span, time behind it.
+        # Forks without a clock: group and time upstream, each group downstream with its span, time downstream.
         self.shares = []
         # Time from SubDevice to SubDevice, by both ends.
         self.links = {}

@@ -34,9 +34,10 @@ fn panic(_: &PanicInfo) -> ! {
     unsafe { abort() }
 }
 
-/// Named by the tables of functions that came compiled for unwinding with the toolchain, such as the division of
-/// 128 bits in `compiler_builtins`. Nothing unwinds here, so nothing calls it.
-// SAFETY: the only function of this name: a std, which has one too, is refused before anything is linked.
+/// The unwind tables of functions that the toolchain delivers compiled for unwinding refer to this symbol, for example
+/// the 128-bit division of `compiler_builtins`. Nothing unwinds here, so nothing calls it.
+// SAFETY: the only function of this name: std defines it too, but a dependency that uses std does not compile here,
+// because of the second panic handler.
 #[unsafe(no_mangle)]
 pub extern "C" fn rust_eh_personality() {}
 

@@ -48,7 +48,7 @@ pub struct BusArguments {
 pub struct Bus {
     /// The scan.
     pub scan: Scan,
-    /// It has two links.
+    /// Whether the scan used two links.
     pub ring: bool,
     /// Version of the firmware of each SubDevice, where it was read.
     pub firmware: Vec<Option<String>>,

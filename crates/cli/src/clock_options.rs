@@ -161,7 +161,7 @@ fn in_front(reference: ReferenceClock, found: &[SubDeviceInfo], declaration: &De
     };
     let first = found[..position].iter().position(|info| info.controller.features.dc)?;
     Some(format!(
-        "the clock of position {first} is in front of the reference clock, position {position}: it follows this host's \
+        "the clock of position {first} is upstream of the reference clock, position {position}: it follows this host's \
          estimate of the reference, and locks only as exactly as this host sends"
     ))
 }

@@ -151,7 +151,7 @@ fn start_cycles(
     )?)
 }
 
-/// What did not hold.
+/// Reasons why the command has failed.
 fn reasons(clocks: &[ClockStatus], locked: bool, settled: bool) -> Vec<String> {
     let mut reasons = Vec::new();
     if !locked {

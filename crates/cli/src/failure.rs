@@ -1,4 +1,4 @@
-//! Why a command could not do what was asked.
+//! Why a command could not be carried out.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use ringcat::sim::segment::SegmentError;
 use ringcat::{Error, ScanError};
 use ringcat_link::LinkError;
 
-/// Why a command could not do what was asked, in words that say what to do. The first line is the reason.
+/// Why a command could not be carried out, in words that say what to do. The first line is the reason.
 #[derive(Debug)]
 pub struct Failure(String);
 

@@ -73,8 +73,8 @@ NetworkManager. Raw frames need root or, once per build:
 `ringcat COMMAND -h` lists the options of a command, `ringcat COMMAND --help`
 explains them. `ringcat help bench` works too.
 
-Exit status: 0 everything held, 1 something did not hold, 2 the command could
-not do what was asked. The last line says what: `result: ok: ...` or
+Exit status: 0 all checks passed, 1 a check failed, 2 the command could not be
+carried out. The last line says what: `result: ok: ...` or
 `result: FAILED: ...`. With --json it is an object on the standard output, see
 docs/json.md. Commands that send refuse to begin beside another MainDevice.";
 

@@ -31,14 +31,14 @@ pub enum List {
     Unread,
     /// The device has no such object.
     Missing,
-    /// Not all.
+    /// A part of it.
     Partly {
         /// The slots that were not read; `None` if their number is not known.
         unread: Option<RangeInclusive<u8>>,
-        /// Why.
+        /// Reason why they were not read.
         reason: String,
     },
-    /// All.
+    /// The whole list.
     Whole,
 }
 

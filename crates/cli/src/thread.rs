@@ -62,7 +62,7 @@ impl ThreadArguments {
         }
     }
 
-    /// The same in words.
+    /// The receive mode, as text for the summary.
     pub fn mode_in_words(self) -> &'static str {
         match self.receive() {
             Receive::Busy => "waiting busy",

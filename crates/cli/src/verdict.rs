@@ -1,7 +1,7 @@
 //! The last line of every command, and the exit status that goes with it.
 //!
-//! `result: ok: ...` and 0, `result: FAILED: ...` and 1 where the command ran and something did not hold, or 2 where it
-//! could not do what was asked. With `--json` the last line of the standard output is the same as an object, and the
+//! `result: ok: ...` and 0, `result: FAILED: ...` and 1 if the command ran and a check failed, or 2 if the command
+//! could not be carried out. With `--json` the last line of the standard output is the same as an object, and the
 //! words go to the standard error output.
 
 use std::fs::File;
@@ -16,17 +16,17 @@ use crate::json::data::Data;
 use crate::json::line::{Ending, Kind, Outcome, ResultLine};
 use crate::output::{self, complain, head, say, warn};
 
-/// Whether everything held that a command was to show.
+/// Result of the checks of a command.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// Everything held, in a few words.
+    /// All checks passed; the result in a few words.
     Held(String),
-    /// What did not hold.
+    /// A check failed; the reasons.
     Failed(String),
 }
 
 impl Verdict {
-    /// All held, where there are no reasons against it.
+    /// All checks passed if there are no reasons for a failure.
     pub fn of(reasons: Vec<String>, held: impl Into<String>) -> Verdict {
         if reasons.is_empty() { Verdict::Held(held.into()) } else { Verdict::Failed(reasons.join("; ")) }
     }
@@ -57,9 +57,9 @@ impl Verdict {
     }
 }
 
-/// Exit status where something did not hold.
+/// Exit status if a check failed.
 const FAILED: u8 = 1;
-/// Exit status where a command could not do what was asked.
+/// Exit status if a command could not be carried out.
 const ERROR: u8 = 2;
 
 /// What a command that ran has found.
@@ -97,7 +97,7 @@ fn conclude_report(verdict: &Verdict, data: &Data) -> ExitCode {
     ExitCode::from(exit_code)
 }
 
-/// The last line of a command that could not do what was asked: the first line of the text says what is wrong, further
+/// The last line of a command that could not be carried out: the first line of the text says what is wrong, further
 /// ones what to do. The exit status.
 pub fn conclude_error(text: &str) -> ExitCode {
     let (first, more) = text.split_once('\n').unwrap_or((text, ""));

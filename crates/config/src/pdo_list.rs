@@ -8,9 +8,9 @@ use ringcat_wire::mailbox::coe::pdo_objects::is_mapping;
 /// An object with a count at subindex 0.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct PdoList {
-    /// `None` if it is not known.
+    /// Value of subindex 0; `None` if it is not known.
     count: Option<u8>,
-    /// By subindex.
+    /// Known entries by subindex.
     entries: BTreeMap<u8, u32>,
 }
 
@@ -21,7 +21,7 @@ impl PdoList {
         PdoList { count: Some(count), entries: (1..=u8::MAX).zip(described).collect() }
     }
 
-    /// After a write.
+    /// The object after this write.
     pub(crate) fn with(mut self, download: &SdoDownload) -> PdoList {
         let SdoDownload { index, sub_index, complete_access, data, .. } = download;
         let size = if is_mapping(*index) { 4 } else { 2 };

@@ -290,7 +290,7 @@ pub enum Answer {
     },
     /// What was read is in the bytes of the message.
     Data,
-    /// It is done.
+    /// The query was carried out; there is no data.
     Done,
     /// To [`Query::Overview`].
     Overview(SegmentOverview),

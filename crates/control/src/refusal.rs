@@ -12,9 +12,9 @@ use crate::owner::Owner;
 pub enum Refusal {
     /// The versions differ.
     Version {
-        /// That of the side that refuses.
+        /// Version of the side that refuses.
         here: u16,
-        /// That of the message.
+        /// Version of the message.
         there: u16,
     },
     /// The client may only read.
@@ -23,7 +23,7 @@ pub enum Refusal {
     NoMaster {
         /// The requested number.
         master: u32,
-        /// Those that are there.
+        /// Numbers of the masters that exist.
         present: Vec<u32>,
     },
     /// Another application drives the master.
@@ -39,7 +39,7 @@ pub enum Refusal {
         master: u32,
         /// The owner.
         owner: Owner,
-        /// For so long.
+        /// Time for which it has not answered.
         limit_ms: u32,
     },
     /// The master passes from one process to another at this moment.
@@ -47,23 +47,23 @@ pub enum Refusal {
         /// Number of the master.
         master: u32,
     },
-    /// Nothing drives the master.
+    /// The master is not driven at present.
     Fault {
         /// Number of the master.
         master: u32,
-        /// Why.
+        /// Reason why it is not driven.
         cause: String,
     },
-    /// It was tried and failed.
+    /// The request was carried out and failed; the reason.
     Failed(String),
-    /// The message is none that is expected here.
+    /// A message of another kind was expected.
     Unexpected {
-        /// What is.
+        /// The expected message.
         expected: String,
     },
-    /// There are as many clients as there may be.
+    /// The maximum number of clients is connected.
     TooManyClients {
-        /// So many.
+        /// This maximum.
         limit: usize,
     },
     /// The owner of the master has the maximum number of pending queries, or of bytes in them.
@@ -75,7 +75,7 @@ pub enum Refusal {
     },
     /// A service of a SubDevice has failed.
     Service {
-        /// How.
+        /// Kind of the failure.
         fault: ServiceFault,
         /// What happened, in one sentence.
         text: String,
@@ -123,7 +123,7 @@ impl fmt::Display for Refusal {
             Refusal::Fault { master, cause } => write!(f, "master {master} is not driven: {cause}"),
             Refusal::Failed(cause) => f.write_str(cause),
             Refusal::Unexpected { expected } => write!(f, "expected {expected}"),
-            Refusal::TooManyClients { limit } => write!(f, "ringcatd has {limit} clients, which is the most it serves"),
+            Refusal::TooManyClients { limit } => write!(f, "ringcatd has the maximum number of clients: {limit}"),
             Refusal::TooManyQueries { master, owner } => {
                 write!(f, "master {master}: {owner} drives it and has the maximum number of pending queries or bytes")
             }

@@ -95,7 +95,7 @@ pub enum ToolQuery {
     SiiWrite {
         /// Position of the SubDevice.
         position: u16,
-        /// Also what is no valid image.
+        /// Writes the bytes even if they are no valid image.
         force: bool,
     },
     /// Writes the alias into the SII.
@@ -104,7 +104,7 @@ pub enum ToolQuery {
         position: u16,
         /// The alias; 0 is none.
         alias: u16,
-        /// Also where the checksum was wrong before.
+        /// Writes the alias even if the checksum is wrong.
         force: bool,
     },
     /// Requests a state and does not wait for it: 1 INIT, 2 PREOP, 3 BOOT, 4 SAFEOP, 8 OP.
@@ -196,8 +196,8 @@ pub enum ToolAnswer {
 /// A piece of a list.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Piece<T> {
-    /// Number of all.
+    /// Number of entries of the whole list.
     pub total: u32,
-    /// Those of this piece.
+    /// Entries of this piece.
     pub these: Vec<T>,
 }

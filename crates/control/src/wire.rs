@@ -20,9 +20,9 @@ const MAGIC: [u8; 4] = *b"RCTL";
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Limits {
-    /// Of the content, in bytes.
+    /// Longest content, in bytes.
     pub content: usize,
-    /// Of its data, in bytes.
+    /// Longest data after it, in bytes.
     pub bytes: usize,
 }
 
@@ -117,7 +117,7 @@ impl Header {
 /// The content of a message from its bytes.
 ///
 /// # Errors
-/// It is none of this version.
+/// The bytes are no message of this version.
 pub fn decode_content(content: &[u8]) -> Result<Content, WireError> {
     let mut rest = content;
     let content = ciborium::from_reader(&mut rest).map_err(|error| WireError::Malformed(error.to_string()))?;
@@ -130,7 +130,7 @@ pub fn decode_content(content: &[u8]) -> Result<Content, WireError> {
 /// A message as bytes.
 ///
 /// # Errors
-/// It is longer than 4 GiB.
+/// The message is longer than 4 GiB.
 pub fn encode(message: &Message) -> Result<Vec<u8>, WireError> {
     let mut out = vec![0; HEADER];
     let written = ciborium::into_writer(&message.content, &mut out);

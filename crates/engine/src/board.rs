@@ -311,7 +311,7 @@ impl Board {
         RingWord::unpack(self.ring.load(Ordering::Acquire))
     }
 
-    /// That state, packed.
+    /// State of the ring in the exchange, as a packed word.
     #[inline]
     pub(crate) fn ring_word(&self) -> u64 {
         self.ring.load(Ordering::Acquire)

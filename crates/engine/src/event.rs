@@ -414,9 +414,9 @@ pub enum Event {
         target: Target,
         /// Expected.
         expected: Wkc,
-        /// That of the last one.
+        /// Working counter of the last of these datagrams.
         got: Wkc,
-        /// Their number since the last report.
+        /// Number of these datagrams since the last report.
         count: u32,
     },
     /// A domain was due while its previous frames were still on the wire.
@@ -441,7 +441,7 @@ pub enum Event {
         /// Largest change in nanoseconds.
         largest_ns: u32,
     },
-    /// The propagation delay of a SubDevice cannot be measured: a fork without a clock is in front of it, and the
+    /// The propagation delay of a SubDevice cannot be measured: a fork without a clock is upstream of it, and the
     /// latched times show only the sum of all its branches (protocol 7.1). Reported once, until the delay is known.
     DelayUnknown {
         /// Position in the scan.

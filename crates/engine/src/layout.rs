@@ -42,7 +42,7 @@ pub use spec::{AreaSpec, Delivers, DomainSpec, FixedImage, ImageOrder, LrwPolicy
 /// The frames that the exchange sends.
 #[derive(Clone, Debug, Default)]
 pub struct Layout {
-    /// By [`DomainId`].
+    /// Domains by [`DomainId`].
     pub domains: Vec<PlannedDomain>,
     /// Largest number of datagrams in a frame.
     pub(crate) most: Option<usize>,

@@ -154,7 +154,7 @@ pub struct RingStatus {
     pub state: RingState,
     /// Whether the ring tolerates a further break.
     pub redundancy: Redundancy,
-    /// By [`Link::index`].
+    /// Status of each link, by [`Link::index`].
     pub links: [LinkStatus; 2],
     /// The cable that is broken, once known.
     pub place: Option<Cable>,

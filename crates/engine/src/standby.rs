@@ -126,7 +126,7 @@ impl Forwarder {
     /// The link that [`Forwarder::forward`] has chosen could not send the frame: marks it for the way back instead.
     ///
     /// # Errors
-    /// It cannot go back either.
+    /// The frame cannot go back either.
     pub fn turn_back(&self, frame: &mut [u8], received_on: Link, failed: Onward) -> Result<Onward, NotForwarded> {
         if failed.link == received_on {
             return Err(NotForwarded::NoLink);

@@ -195,7 +195,7 @@ impl<'a> Session<'a> {
     /// A list of an option; all without it.
     ///
     /// # Errors
-    /// It is no list.
+    /// The text is no list.
     pub fn list(&self, text: Option<&str>, what: &str) -> Result<List, Failure> {
         let Some(text) = text else { return Ok(List::all()) };
         List::parse(text).ok_or_else(|| Failure::usage(format!("Invalid {what} list '{text}'!")))

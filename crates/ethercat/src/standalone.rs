@@ -167,7 +167,7 @@ fn listen_to(stderr: Option<ChildStderr>) -> Option<JoinHandle<String>> {
         }
         String::from_utf8_lossy(&kept).into_owned()
     };
-    // Without the thread nothing is known of it.
+    // If the thread cannot be started, the output of the daemon is not shown.
     std::thread::Builder::new().name("ringcatd".into()).spawn(read).ok()
 }
 
@@ -276,7 +276,7 @@ impl PrivateDirectory {
             let path = place.join(format!("ethercat-{}-{number}", std::process::id()));
             match fs::DirBuilder::new().mode(0o700).create(&path) {
                 Ok(()) => return Ok(PrivateDirectory(path)),
-                // One of an earlier process with this number.
+                // An earlier process with this number has left its directory.
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
                 Err(error) => return Err(Failure::failed(format!("'{}' cannot be made: {error}", path.display()))),
             }

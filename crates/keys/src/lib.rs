@@ -102,7 +102,7 @@ fn text(tables: &[Table]) -> String {
 /// Holds the page against the tables, or writes them into it; `begin` is the line before them.
 ///
 /// # Panics
-/// They differ.
+/// The page and the tables differ.
 pub fn check_page(path: &Path, begin: &str, tables: &[Table]) {
     if !path.with_file_name("FEATURES.md").exists() {
         println!("skipped: a package has no pages, {} is not there", path.display());
@@ -127,7 +127,7 @@ pub fn check_page(path: &Path, begin: &str, tables: &[Table]) {
 /// Every key has a type, a meaning and a unit.
 ///
 /// # Panics
-/// One lacks any of these.
+/// A key lacks one of these.
 pub fn check_keys(tables: &[Table]) {
     for (heading, keys) in tables {
         for Key { path, kind, meaning } in keys {

@@ -51,7 +51,7 @@ impl Heartbeat {
         Heartbeat::adopt(memory.into())
     }
 
-    /// That of another process.
+    /// The heartbeat of another process.
     ///
     /// # Errors
     /// This is no memory of a heartbeat, or this process has no more memory.

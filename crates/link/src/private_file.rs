@@ -76,7 +76,7 @@ mod tests {
         open(&path).expect("it can be made");
         assert_eq!(mode(&path), 0o600);
         fs::write(&path, "kept").expect("it is writable");
-        // As an earlier version has left it.
+        // Earlier versions made the file with this mode.
         fs::set_permissions(&path, Permissions::from_mode(0o644)).expect("it is writable");
         open(&path).expect("it is writable");
         assert_eq!((mode(&path), fs::read_to_string(&path).expect("it is there")), (0o600, "kept".to_owned()));

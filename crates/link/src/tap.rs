@@ -51,7 +51,7 @@ pub enum TapError {
     Refused {
         /// The interface.
         name: String,
-        /// Why.
+        /// Reason of the refusal.
         cause: String,
     },
     /// Another system call error.
@@ -147,7 +147,7 @@ impl TapInterface {
 
     /// From now on it exists as long as a process has it.
     pub fn end_with_processes(&self) {
-        // It was removed otherwise.
+        // This fails only if the interface was removed meanwhile.
         let _ = set_lasting(&self.fd, false);
     }
 

@@ -5,7 +5,7 @@ use ringcat_engine::time::Instant;
 
 use crate::links::Links;
 
-/// Nothing.
+/// Data of MainDevice redundancy: none without the feature `standby`.
 #[derive(Debug, Default)]
 pub(crate) struct OfTwo {}
 

@@ -30,7 +30,7 @@ impl Default for Histogram {
     }
 }
 
-/// How many times are within limits.
+/// Number of measured times within limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Bucket {
@@ -38,7 +38,7 @@ pub struct Bucket {
     pub begin: Duration,
     /// Times that are counted here are shorter.
     pub end: Duration,
-    /// How many.
+    /// Number of times.
     pub count: u64,
 }
 

@@ -12,9 +12,9 @@ use ringcat_wire::frame::{MAX_FRAME_VLAN, MacAddress};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct PerLink<T> {
-    /// Of the main link.
+    /// Value of the main link.
     pub main: T,
-    /// Of the redundant link, in a ring.
+    /// Value of the redundant link, in a ring.
     pub redundant: Option<T>,
 }
 

@@ -20,9 +20,9 @@ pub enum Driver {
     Daemon(Driving, Arc<Opened>),
     /// An application, with the descriptors that it has.
     Owner(Arc<OwnerLink>, Arc<Opened>),
-    /// It passes from one process to another.
+    /// The master passes from one process to another.
     Changing,
-    /// Nothing, because of this.
+    /// No process, for this reason.
     Fault(String),
 }
 
@@ -34,7 +34,7 @@ pub struct Current {
 }
 
 impl Default for Current {
-    /// Nothing yet.
+    /// The first driver is being chosen.
     fn default() -> Current {
         Current { driver: Mutex::new(Driver::Changing), changed: Condvar::new() }
     }

@@ -101,7 +101,7 @@ pub fn print(priority: Priority, line: String) {
     if is_first {
         let body = || LOG.write(&OperatorLines::new(NAME, |name| std::env::var(name).ok()), std::io::stderr());
         let thread = thread::Builder::new().name("log".into()).spawn(body);
-        // Without a thread now, the next line tries again.
+        // If the thread cannot be started, the next line tries again.
         LOG.lines().has_thread = thread.is_ok();
     }
     LOG.push(priority, line);

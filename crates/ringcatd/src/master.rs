@@ -26,7 +26,7 @@ use crate::wires::Wires;
 
 /// The message that the daemon has failed reaches an owner within this time.
 const TELL: Duration = Duration::from_millis(100);
-/// This message, also for the operator.
+/// Text of this message, also for the operator.
 const FAILED: &str = "a thread of the daemon has failed";
 
 /// How a master is driven.
@@ -299,13 +299,13 @@ impl Master {
         is_usable
     }
 
-    /// Nothing drives the master, because of this.
+    /// From now on the master is not driven, for this reason.
     fn fail(&self, cause: &str) {
         say(format_args!("master {} is not driven: {cause}", self.number));
         let fault = Driver::Fault(cause.to_owned());
         if let Driver::Owner(owner, _) = self.driver.set(fault) {
             owner.end();
-            // It may have ended.
+            // An owner that has ended gets no message.
             let content = Content::TakenBack { cause: cause.to_owned() };
             let _ = owner.connection().send_within(&content.into(), TELL);
         }

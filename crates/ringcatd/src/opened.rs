@@ -43,7 +43,7 @@ enum State {
 #[derive(Debug)]
 struct Followed {
     device: Device,
-    /// As it was last seen.
+    /// Its last known name.
     name: String,
     is_there: bool,
     /// An owner has ordered it switched off.

@@ -28,10 +28,10 @@ pub enum ProcessState {
 pub struct ProcessFile(File);
 
 impl ProcessFile {
-    /// Of this process.
+    /// Opens the state of this process.
     ///
     /// # Errors
-    /// There is none, or this user may not see it.
+    /// There is no such process, or this user may not see it.
     pub fn open(pid: u32) -> io::Result<ProcessFile> {
         Ok(ProcessFile(File::open(format!("/proc/{pid}/stat"))?))
     }

@@ -84,7 +84,7 @@ impl fmt::Display for Rights {
 /// The number of a group by its number or its name in `/etc/group`.
 ///
 /// # Errors
-/// There is none.
+/// There is no such group.
 pub fn group(text: &str) -> Result<u32, String> {
     let number = text.parse().ok();
     let file = || fs::read_to_string("/etc/group").unwrap_or_default();
@@ -101,7 +101,7 @@ fn named(file: &str, name: &str) -> Option<u32> {
 /// A mode as `chmod` takes it: octal digits, of the bits to read and to change.
 ///
 /// # Errors
-/// It is none.
+/// The text is no such mode.
 pub fn mode(text: &str) -> Result<u32, String> {
     let is_octal = !text.is_empty() && text.bytes().all(|it| matches!(it, b'0'..=b'7'));
     let mode = u32::from_str_radix(text, 8).ok().filter(|mode| is_octal && *mode & !BITS == 0);

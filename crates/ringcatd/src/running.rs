@@ -91,7 +91,7 @@ fn end_with_input() -> Result<(), String> {
 /// chosen is one that nothing else uses.
 fn warn_of_others(option: &MasterOption) {
     let named = option.source.devices().filter(|device| **device != Device::First);
-    // One that is not there yet is waited for.
+    // An interface that does not exist yet has no users.
     let found = named.filter_map(|device| device.find(&[]).ok().flatten());
     for warning in found.flat_map(|found| exclusive_use(&found.name)) {
         print(Priority::Warning, format!("ringcatd: master {}: {warning}", option.master));

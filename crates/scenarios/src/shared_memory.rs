@@ -11,7 +11,7 @@ use std::path::Path;
 /// Makes memory without a name in the file system. Other processes open it by [`path_of`].
 ///
 /// # Errors
-/// Those of the kernel.
+/// Errors of the kernel.
 pub fn make(length: usize) -> io::Result<File> {
     // SAFETY: the name is a constant that ends with a zero.
     let fd = unsafe { libc::memfd_create(c"image".as_ptr(), libc::MFD_CLOEXEC) };
@@ -32,7 +32,7 @@ pub fn path_of(memory: &File) -> String {
 /// Opens memory of another process.
 ///
 /// # Errors
-/// Those of the kernel.
+/// Errors of the kernel.
 pub fn open(path: impl AsRef<Path>) -> io::Result<File> {
     OpenOptions::new().read(true).write(true).open(path)
 }
@@ -40,7 +40,7 @@ pub fn open(path: impl AsRef<Path>) -> io::Result<File> {
 /// Maps all of it until the process ends. A scenario does this once in each process.
 ///
 /// # Errors
-/// Those of the kernel.
+/// Errors of the kernel.
 pub fn map(memory: &File) -> io::Result<&'static mut [u8]> {
     let length = usize::try_from(memory.metadata()?.len()).map_err(io::Error::other)?;
     let access = libc::PROT_READ | libc::PROT_WRITE;

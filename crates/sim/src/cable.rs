@@ -51,9 +51,9 @@ impl HostLink {
 /// One of two MainDevices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Host {
-    /// That with [`HostLink::Main`].
+    /// The MainDevice with [`HostLink::Main`].
     First = 0,
-    /// That with [`HostLink::SecondMain`].
+    /// The MainDevice with [`HostLink::SecondMain`].
     Second = 1,
 }
 

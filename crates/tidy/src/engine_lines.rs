@@ -73,9 +73,9 @@ impl fmt::Display for Kinds {
 /// Lines of the engine.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Lines {
-    /// All of them.
+    /// All lines.
     pub all: Kinds,
-    /// By module.
+    /// Lines by module.
     pub modules: BTreeMap<String, Kinds>,
 }
 

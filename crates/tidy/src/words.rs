@@ -18,7 +18,7 @@ pub struct Allowed {
     pub file: &'static str,
     /// What is allowed in it, word for word; the whole file without one.
     pub phrase: Option<&'static str>,
-    /// Why.
+    /// Reason of the exception.
     pub reason: &'static str,
 }
 

@@ -15,7 +15,7 @@ pub enum Incident {
         /// Positions of its ends.
         ends: (usize, usize),
     },
-    /// The same cable is healed.
+    /// The cable that was cut is repaired.
     Heal {
         /// The cable.
         cable: CableId,
@@ -29,7 +29,7 @@ pub enum Incident {
         /// Its position.
         position: usize,
     },
-    /// It gets it back.
+    /// The SubDevice has power again.
     PowerOn {
         /// The device.
         device: DeviceIndex,

@@ -30,8 +30,8 @@ pub struct Clock {
     pub reference: bool,
     /// Whether it is locked
     pub locked: bool,
-    /// Whether OP requires that it is locked: it has SYNC signals, or follows the reference; a clock without SYNC in
-    /// front of the reference follows the estimate of the host
+    /// Whether OP requires that it is locked: it has SYNC signals, or follows the reference; a clock without SYNC
+    /// upstream of the reference follows the estimate of the host
     pub required: bool,
     /// Propagation delay from the reference clock (register 0x0928), in nanoseconds; null where none was written
     pub delay_ns: Option<i64>,

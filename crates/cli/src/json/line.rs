@@ -52,7 +52,7 @@ pub struct ResultLine<'a> {
 #[derive(Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Ending {
-    /// `ok`: everything held; `failed`: it ran and something did not hold; `error`: it could not be carried out
+    /// `ok`: all checks passed; `failed`: the command ran and a check failed; `error`: it could not be carried out
     pub outcome: Outcome,
     /// Exit status of the program: 0, 1 or 2, in the order of the outcomes
     pub exit_code: u8,
@@ -67,11 +67,11 @@ pub struct Ending {
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Outcome {
-    /// Everything held.
+    /// All checks passed.
     Ok,
-    /// It ran, and something did not hold.
+    /// The command ran, and a check failed.
     Failed,
-    /// It could not do what was asked.
+    /// The command could not be carried out.
     Error,
 }
 

@@ -131,7 +131,7 @@ pub struct Acyclic {
     pub datagrams: u64,
     /// How many of them were sent again
     pub resent_datagrams: u64,
-    /// Mails of SubDevices that came after their requests had ended, and were dropped
+    /// Mailbox messages that arrived when no read waited for them, and were dropped
     pub dropped_mails: u64,
     /// Frames of other MainDevices
     pub foreign_frames: u64,

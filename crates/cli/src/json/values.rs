@@ -21,7 +21,7 @@ pub struct Times {
 }
 
 impl Times {
-    /// Those of a histogram; `None` where it is empty.
+    /// The times of a histogram; `None` where it is empty.
     pub fn of(histogram: &Histogram) -> Option<Times> {
         let ns = |parts_per_million| histogram.quantile(parts_per_million).as_nanos() as u64;
         (histogram.count() > 0).then(|| Times {
@@ -33,7 +33,7 @@ impl Times {
         })
     }
 
-    /// Those of a sorted list; `None` where it is empty.
+    /// The times of a sorted list; `None` where it is empty.
     pub fn of_sorted(sorted_ns: &[u64]) -> Option<Times> {
         let (shortest_ns, longest_ns) = (*sorted_ns.first()?, *sorted_ns.last()?);
         let at = |percent: usize| sorted_ns[(sorted_ns.len() * percent / 100).min(sorted_ns.len() - 1)];
@@ -93,7 +93,7 @@ pub struct State {
 }
 
 impl State {
-    /// Those of all SubDevices; `names` by their index.
+    /// The states of all SubDevices; `names` by their index.
     pub fn of_all(states: &[SubDeviceState], names: &[String]) -> Vec<State> {
         let state = |(subdevice, state): (usize, &SubDeviceState)| State {
             subdevice,

@@ -202,7 +202,7 @@ pub fn final_account(links: &mut WireLinks, supervisor: &SupervisorThread, names
     );
     say!("    {} datagrams, {} of them sent again", acyclic.datagrams, acyclic.resent);
     if acyclic.mails_dropped > 0 {
-        say!("    {} mails dropped: they came after their requests had ended", acyclic.mails_dropped);
+        say!("    {} mailbox messages dropped: they arrived when no read waited for them", acyclic.mails_dropped);
     }
     interfaces
 }

@@ -13,11 +13,11 @@ const QUIET: Duration = Duration::from_secs(1);
 /// Late wake-ups.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Lateness {
-    /// How many.
+    /// Number of late wake-ups.
     pub count: u64,
-    /// The latest.
+    /// The longest delay.
     pub longest: Duration,
-    /// All of them together.
+    /// Sum of all delays.
     pub total: Duration,
     reported: u64,
     longest_since: Duration,

@@ -74,13 +74,13 @@ pub struct Guarded {
 }
 
 impl Guarded {
-    /// Not guarded.
+    /// No guard, with a warning.
     pub fn unguarded() -> Guarded {
         warn("without a guard: if this program is killed or hangs, the ACTIVE has no bus");
         Guarded::none()
     }
 
-    /// The same without a warning.
+    /// No guard, without a warning.
     pub fn none() -> Guarded {
         Guarded { guard: None, limit: Duration::MAX, look_at: Instant::default(), fault: None }
     }

@@ -34,7 +34,7 @@ Without a declaration it never sends on its own. With --eni, --network or
 if frames of an ACTIVE arrive, otherwise ACTIVE. As INACTIVE it takes over when
 no process data has arrived for --timeout cycles. At its end an ACTIVE hands the
 role over if the other one is ready; otherwise it stops the bus as `ringcat run`
-does. Exit status 1 if something did not hold; the last line reports what.
+does. Exit status 1 if a check failed; the last line reports which.
 
 With --tap on both sides, Ethernet passes between them in acyclic frames:
   ringcat standby ... --tap rc0

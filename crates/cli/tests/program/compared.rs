@@ -161,10 +161,11 @@ fn pdos_of_modules_that_the_eeprom_cannot_list_are_no_differences() {
     }
 }
 
-/// A device refuses a mapping that its SII fixes: a file of a scan says so, and its ENI has no command for it.
+/// A device refuses to change the mapping of a PDO that its SII marks as fixed: the file of a scan declares the PDO as
+/// `fixed`, and its ENI has no command that writes the mapping.
 // covers: network-file, eni-run
 #[test]
-fn a_file_of_a_scan_has_the_pdos_fixed_that_the_sii_fixes() {
+fn pdos_that_the_sii_marks_as_fixed_are_fixed_in_the_file_of_a_scan() {
     let place = Place::new("fixed");
     let bus = place.write("bus.toml", "[[device]]\nesi = \"acme.xml\"\ntype = \"AA02\"\n");
     let (machine, eni) = (place.path("machine.toml"), place.path("machine.xml"));
@@ -182,6 +183,6 @@ fn a_file_of_a_scan_has_the_pdos_fixed_that_the_sii_fixes() {
         assert_eq!(export.code, Some(0), "{}", export.all());
         let text = place.read("machine.xml");
         assert!(text.contains("assign pdo 0x1a00"), "PDOs are assigned: {coe}");
-        assert!(!text.contains("clear pdo 0x1a0"), "they are mapped: {coe}");
+        assert!(!text.contains("clear pdo 0x1a0"), "no mapping is written: {coe}");
     }
 }

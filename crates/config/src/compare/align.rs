@@ -217,7 +217,7 @@ pub(super) fn position(config: &SubDeviceConfig) -> usize {
 }
 
 /// SubDevices that are declared by alias, identification or data word. If several have one identifier, the activation
-/// uses none of them; then it is the first one that is the declared device.
+/// uses none of them; here the first one that is the declared device is compared.
 fn by_mark(
     configs: &[SubDeviceConfig],
     (found, stated): (&[SubDeviceInfo], &[Stated]),

@@ -19,7 +19,7 @@ const MANDATORY: u32 = 1;
 /// Vendor, product, serial number.
 type Unit = (u32, u32, u32);
 
-/// Both sides.
+/// The SubDevices of a file and of a bus, which are compared.
 pub(super) struct Alike<'a> {
     configs: &'a [SubDeviceConfig],
     found: &'a [SubDeviceInfo],

@@ -9,7 +9,7 @@ use crate::configuration::Configuration;
 
 /// What an activation does with the SubDevices that were found.
 pub(super) struct Marks {
-    /// By declaration.
+    /// Results of the engine's resolution.
     resolutions: Vec<Resolution>,
     required: Required,
     /// The SubDevices whose declarations fail because they are at other positions than declared: index in the file,

@@ -17,11 +17,11 @@ use super::written::Written;
 /// Lengths of a SyncManager in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Lengths {
-    /// As declared.
+    /// The declared length.
     pub(super) declared: u16,
     /// The length that the SubDevice has.
     pub(super) own: u16,
-    /// Why they differ.
+    /// Reason of the difference.
     reason: Reason,
     /// Whether the length of the SubDevice is due to start-up commands of the file.
     pub(super) is_written: bool,

@@ -61,7 +61,7 @@ pub(super) fn changes(cables: &[Cable]) -> Vec<Change> {
 /// The cables by what they connect.
 struct Lists<'a> {
     cables: &'a [Cable],
-    /// By the SubDevice at their port 0.
+    /// Index of a cable by the SubDevice at its port 0.
     of_node: BTreeMap<usize, usize>,
     /// By their other end in the file.
     said: BTreeMap<End, usize>,

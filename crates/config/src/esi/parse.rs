@@ -137,7 +137,7 @@ fn note_groups(descriptions: Element<'_>, groups: &[Group], devices: &[Device]) 
     let mut lines: HashMap<&str, u32> = HashMap::new();
     for group in groups {
         if let Some(line) = lines.get(group.key.trim()) {
-            let text = format!("Group {}: the one of line {line} counts", shown(group.key.trim()));
+            let text = format!("Group {} is defined in line {line} already: not used", shown(group.key.trim()));
             descriptions.note_at(group.line, text);
         } else {
             lines.insert(group.key.trim(), group.line);

@@ -185,7 +185,7 @@ fn add(
     notices: &mut Notices,
 ) -> Result<(), EsiError> {
     if !known.insert(identity(&module)) {
-        notices.add(at, format!("module {:#010x} of {} is there already: not used", module.ident, shown(path)));
+        notices.add(at, format!("module {:#010x} of {} is defined already: not used", module.ident, shown(path)));
     } else if esi.modules.len() == MAX_DEVICES {
         let problem = EsiProblem::TooMuch { what: "modules", limit: MAX_DEVICES };
         return Err(EsiError::at_line(path, module.line, module.kind.trim(), problem));

@@ -22,13 +22,13 @@ impl RevisionCheck {
 /// The description chosen for a revision on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Choice {
-    /// That of the revision itself.
+    /// The description of this revision.
     Exact(u32),
     /// An older description of the same variant.
     Older(u32),
-    /// A newer one, where these are accepted.
+    /// A newer description, where these are accepted.
     Newer(u32),
-    /// None; the nearest of the same variant, if there is one.
+    /// No description; the nearest revision of the same variant, if there is one.
     None(Option<u32>),
 }
 

@@ -8,7 +8,7 @@ use crate::eni::{Eni, Pdo};
 pub struct ExportDetails {
     /// Name of the network.
     pub name: String,
-    /// By SubDevice.
+    /// Details of the SubDevices, by index in the declaration.
     pub subdevices: Vec<SubDeviceDetails>,
     /// Names of the domains.
     pub tasks: Vec<String>,

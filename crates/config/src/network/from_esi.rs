@@ -92,7 +92,7 @@ impl Notes {
         let has_frame = device.sync_units.iter().any(|unit| unit.separate_frame);
         let potential = device.clock.as_ref().is_some_and(|clock| clock.potential_reference);
         for (is_stated, notice) in [
-            (device.use_lrd_lwr, "UseLrdLwr: the EEPROM of the device decides whether it is in an LRW"),
+            (device.use_lrd_lwr, "UseLrdLwr: the EEPROM of the device states whether it supports LRW"),
             (
                 aoe.is_some_and(|aoe| aoe.generate_net_id),
                 "AoE GenerateOwnNetId: no AMS NetId is chosen; a start-up command may write one",

@@ -183,7 +183,8 @@ fn sync_manager(info: &SubDeviceInfo, area: &AreaPlan) -> SyncManager {
     }
 }
 
-/// A PDO with the names and types of the SII. It is fixed where a mapping could be written and the SII permits none.
+/// A PDO with the names and types of the SII. It is `fixed` if the SubDevice accepts PDO mappings (PdoConfig) and
+/// the SII marks this PDO as fixed.
 fn of_pdo(info: &SubDeviceInfo, pdo: &MappedPdo) -> Pdo {
     let described = info.pdo(pdo.index);
     let takes_mappings = info.protocols.coe() && info.coe.pdo_configuration();

@@ -48,12 +48,12 @@ pub struct NetworkFile {
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Required {
-    /// Optional ones too.
+    /// Each absent SubDevice, optional or not.
     All,
-    /// Those that are not optional.
+    /// Each absent SubDevice that is not optional.
     #[default]
     Mandatory,
-    /// None.
+    /// No absent SubDevice.
     Nothing,
 }
 
@@ -92,12 +92,12 @@ pub struct Redundancy {
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Junctions {
-    /// There are none.
+    /// The network has no rings behind junctions.
     #[default]
     Disabled,
-    /// The scan finds them.
+    /// The scan finds the rings behind junctions.
     Automatic,
-    /// Those of the file.
+    /// The rings behind junctions are those that the file declares.
     Strict,
 }
 
@@ -452,14 +452,14 @@ pub struct Sync {
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Repeat {
-    /// By what is known of it.
+    /// Chosen from what is known of the SubDevice.
     #[default]
     Automatic,
     /// Outputs and inputs.
     Everything,
     /// Inputs.
     Inputs,
-    /// Nothing.
+    /// Neither outputs nor inputs.
     Nothing,
 }
 

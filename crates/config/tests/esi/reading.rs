@@ -149,8 +149,8 @@ fn duplicate_definitions_and_undefined_names_are_notices_with_their_lines() {
     let twice = [&acme[..end], item, &acme[end + "</DataType>".len()..]].concat();
     let plain = acme_of(acme).notices.len();
     for (text, expected) in [
-        (acme.replacen("</Objects>", &format!("{object}</Objects>"), 1), "Object 0x8000 of line 87 is there already"),
-        (acme.replacen("</Groups>", group, 1), "Group \"AcmeIo\": the one of line 11 counts"),
+        (acme.replacen("</Objects>", &format!("{object}</Objects>"), 1), "Object 0x8000 is defined in line 87 already"),
+        (acme.replacen("</Groups>", group, 1), "Group \"AcmeIo\" is defined in line 11 already"),
         (acme.replacen("<GroupType>AcmeDrives<", "<GroupType>Acme<", 1), "GroupType \"Acme\": there is no such group"),
         (acme.replacen("<Type>DT6000</Type>", "<Type>NOTYPE</Type>", 1), "the type \"NOTYPE\" is not defined"),
         (acme.replacen("<BaseType>UINT<", "<BaseType>NOBASE<", 1), "the type \"NOBASE\" is not defined"),

@@ -29,9 +29,10 @@ pub fn model(path: &Path) -> Esi {
 }
 
 /// Notices of duplicate definitions, and of undefined groups and types.
-const NOTED: [&str; 5] = ["is there already", "the one of line", "no such group", "is not defined", "SubIdx"];
+const NOTED: [&str; 5] =
+    ["is defined in line", "is defined several times", "no such group", "is not defined", "SubIdx"];
 
-/// What the limits of the reader are above of.
+/// The limits of the reader leave room for larger files.
 // covers: ES-02, ES-04
 #[test]
 fn the_largest_real_file_is_far_below_the_limits() {

@@ -236,7 +236,7 @@ fn fmmus_and_sync_managers_have_the_bytes_of_files_of_tools() {
 
 // covers: ES-178, eni-run
 #[test]
-fn exported_auto_increment_addresses_count_down_identities_are_read_by_word() {
+fn exported_auto_increment_addresses_count_down_and_identities_are_read_by_word() {
     let eni = exported();
     let places: Vec<u16> = eni.subdevices.iter().take(4).filter_map(|it| it.auto_increment).collect();
     assert_eq!(places, [0, 65535, 65534, 65533]);

@@ -129,7 +129,7 @@ fn large_different_networks_are_compared_in_bounded_time() {
     assert!(begin.elapsed() < Duration::from_secs(20), "{:?}", begin.elapsed());
 }
 
-/// By index of the bus.
+/// Of several SubDevices of one type, each is compared with its own declaration only.
 // covers: network-file
 #[test]
 fn a_found_subdevice_has_the_modules_and_pdos_of_its_own_declaration() {

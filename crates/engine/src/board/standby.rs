@@ -130,7 +130,7 @@ impl StandbyWords {
         self.write.store(write.map_or(0, MemoryWrite::code), Ordering::Relaxed);
     }
 
-    /// That write.
+    /// The write into the memory of a SubDevice that is under way here.
     pub fn write(&self) -> Option<MemoryWrite> {
         MemoryWrite::from_code(self.write.load(Ordering::Relaxed))
     }

@@ -1,6 +1,6 @@
 //! Sets of ports to close, one after the other, to measure the branches behind forks without a clock (protocol 7.1).
 //!
-//! A clock in front of such a fork measures the time of all branches together. With all branches closed, it measures
+//! A clock upstream of such a fork measures the time of all branches together. With all branches closed, it measures
 //! the path to the fork; with one branch open, the path into this branch. The single times follow exactly from these
 //! sums. Input: the cables, and which SubDevices have a clock. Output: sets of ports. SubDevices behind closed ports
 //! are not reachable, so this is done at set-up only, before the exchange of process data.
@@ -25,7 +25,7 @@ pub fn sets(wiring: &Wiring, has_clock: &[bool]) -> Vec<Vec<PortOf>> {
     sets.filter_map(|(fork, open)| tree.closed(fork, open)).take(MOST_SETS).collect()
 }
 
-/// Whether a fork without a clock, with a clock in front, has branches.
+/// Whether a fork without a clock, with a clock upstream of it, has branches.
 pub fn are_hidden(topology: &Topology, has_clock: &[bool]) -> bool {
     !sets(&Wiring::new(topology, false, |_| true), has_clock).is_empty()
 }

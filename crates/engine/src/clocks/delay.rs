@@ -145,7 +145,7 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         let count = delays.units.len();
         let mut places = Places::new(count);
         let mut units: Vec<Option<Place>> = vec![None; count];
-        // The path before the first clock, and between branches in front of it, is not measured.
+        // The path before the first clock, and between branches before it, is not measured.
         delays.is_guessed |= self.trunk(cables, &mut places);
         for place in 0..self.path.len() {
             let PortOf { node, port } = self.path[place].at;
@@ -315,7 +315,7 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
         };
         let (before, all) = (unknown(front), unknown(all));
         let count = |of: &[Ends], ends: &Ends| of.iter().filter(|other| *other == ends).count() as i64;
-        // The extremes: one cable takes all of the rest, namely that with the largest or the smallest part in front.
+        // The extremes: one cable takes all of the rest, namely that with the largest or the smallest part upstream.
         let shares = || all.iter().map(|ends| rest * count(&before, ends) / count(&all, ends).max(1));
         let (least, most) = (shares().min().unwrap_or(0), shares().max().unwrap_or(0));
         let spans = front.split_last().map_or(0, |(_, before)| before.iter().map(|section| section.span).sum());
@@ -373,7 +373,7 @@ impl<'a, C: Fn(usize) -> Option<PortTimes>> Walk<'a, C> {
     fn sections(&self, from: usize, to: usize, known: &dyn Fn(&[Ends]) -> Option<i64>) -> Vec<Section> {
         let mut sections = Vec::new();
         let mut begin = from;
-        // The SubDevice in front of a branch is not part of it; the first SubDevice of the path is.
+        // The SubDevice before a branch is not part of it; the first SubDevice of the path is.
         let mut place = if from == 0 && to == self.path.len() { from } else { from + 1 };
         let section = |from: usize, to: usize, span: i64| {
             let hops = self.hops(from, to);

@@ -13,7 +13,7 @@ pub enum ReferenceClock {
     /// The first SubDevice with a clock among those for which SYNC signals are declared.
     FirstConfigured,
     /// The SubDevice with this index in the declaration. SubDevices that frames pass before it receive a time that the
-    /// host predicts instead of the reference time: a reference clock in front of all others is more exact.
+    /// host predicts instead of the reference time: a reference clock upstream of all others is more exact.
     Declared(SubDeviceId),
 }
 

@@ -42,55 +42,55 @@ pub(super) fn missing(declared: &SubDeviceConfig, config: usize, error: ConfigEr
 
 /// What identifies a SubDevice at any place: its alias, identification or a data word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Mark {
+enum Identifier {
     Alias(u16),
     Identification(u16),
     DataWord(RegisterAddress, u16),
 }
 
-impl Mark {
-    /// The mark that an address refers to; `None` for a position, and for alias 0, which means a position.
-    const fn of(address: ConfigAddress) -> Option<Mark> {
+impl Identifier {
+    /// The identifier that an address refers to; `None` for a position, and for alias 0, which means a position.
+    const fn of(address: ConfigAddress) -> Option<Identifier> {
         match address {
             ConfigAddress::Alias { alias: 0, .. } | ConfigAddress::Position(_) => None,
-            ConfigAddress::Alias { alias, .. } => Some(Mark::Alias(alias)),
-            ConfigAddress::Identification { value, .. } => Some(Mark::Identification(value)),
-            ConfigAddress::DataWord { register, value, .. } => Some(Mark::DataWord(register, value)),
+            ConfigAddress::Alias { alias, .. } => Some(Identifier::Alias(alias)),
+            ConfigAddress::Identification { value, .. } => Some(Identifier::Identification(value)),
+            ConfigAddress::DataWord { register, value, .. } => Some(Identifier::DataWord(register, value)),
         }
     }
 
-    /// All marks of a SubDevice.
-    fn all_of(info: &SubDeviceInfo) -> impl Iterator<Item = Mark> {
-        let alias = (info.alias != 0).then_some(Mark::Alias(info.alias));
-        let words = info.data_words.iter().map(|word| Mark::DataWord(word.register, word.value));
-        alias.into_iter().chain(info.identification.map(Mark::Identification)).chain(words)
+    /// All identifiers of a SubDevice.
+    fn all_of(info: &SubDeviceInfo) -> impl Iterator<Item = Identifier> {
+        let alias = (info.alias != 0).then_some(Identifier::Alias(info.alias));
+        let words = info.data_words.iter().map(|word| Identifier::DataWord(word.register, word.value));
+        alias.into_iter().chain(info.identification.map(Identifier::Identification)).chain(words)
     }
 }
 
 /// The SubDevices of a scan by their aliases, identifications and data words.
 #[derive(Clone, Debug)]
 pub struct Marked {
-    /// In the order of marks, then of the SubDevices.
-    marks: Vec<(Mark, usize)>,
+    /// In the order of identifiers, then of the SubDevices.
+    identifiers: Vec<(Identifier, usize)>,
 }
 
 impl Marked {
-    /// Reads the marks of the SubDevices of a scan.
+    /// Reads the identifiers of the SubDevices of a scan.
     pub fn new(infos: &[impl Borrow<SubDeviceInfo>]) -> Marked {
         let indexed = infos.iter().map(Borrow::borrow).enumerate();
-        let mut marks: Vec<(Mark, usize)> =
-            indexed.flat_map(|(at, info)| Mark::all_of(info).map(move |mark| (mark, at))).collect();
-        marks.put_in_order();
-        Marked { marks }
+        let mut identifiers: Vec<(Identifier, usize)> =
+            indexed.flat_map(|(at, info)| Identifier::all_of(info).map(move |identifier| (identifier, at))).collect();
+        identifiers.put_in_order();
+        Marked { identifiers }
     }
 
     /// Indices of all SubDevices with the alias, identification or data word of an address, in their order. An
     /// activation uses the SubDevice if it is the only one, and refuses the declaration if there are several. Empty for
     /// a position and for alias 0, which means a position.
     pub fn all(&self, address: ConfigAddress) -> impl Iterator<Item = usize> {
-        let mark = Mark::of(address);
-        let first = self.marks.partition_point(|(other, _)| Some(*other) < mark);
-        self.marks[first..].iter().take_while(move |(other, _)| Some(*other) == mark).map(|(_, at)| *at)
+        let identifier = Identifier::of(address);
+        let first = self.identifiers.partition_point(|(other, _)| Some(*other) < identifier);
+        self.identifiers[first..].iter().take_while(move |(other, _)| Some(*other) == identifier).map(|(_, at)| *at)
     }
 
     /// The only SubDevice with the alias, identification or data word of an address; the first one for alias 0.

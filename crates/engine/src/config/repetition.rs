@@ -13,6 +13,6 @@ pub enum Repetition {
     Everything,
     /// Inputs: each write of outputs is an event for it (SM-synchronous).
     Inputs,
-    /// Nothing.
+    /// Nothing is received again.
     Nothing,
 }

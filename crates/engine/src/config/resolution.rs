@@ -91,7 +91,7 @@ pub enum Resolution {
     Failed {
         /// The declaration.
         config: usize,
-        /// Why.
+        /// Reason why it has none.
         error: ConfigError,
     },
     /// The SubDevice has no declaration.

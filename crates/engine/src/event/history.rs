@@ -78,7 +78,7 @@ const fn declared(subdevice: Address) -> Option<SubDeviceId> {
 /// The messages, the next slot, and the acknowledgement.
 #[derive(Clone, Debug, Default)]
 pub struct History {
-    /// By slot; grows up to [`MESSAGES`].
+    /// Messages by slot; grows up to [`MESSAGES`].
     incidents: Vec<Incident>,
     /// Slot of the newest message.
     newest: Option<u8>,

@@ -21,7 +21,7 @@ pub enum StandbyEvent {
     RoleChanged {
         /// The role now.
         role: MainDeviceRole,
-        /// Why.
+        /// Cause of the change.
         cause: RoleCause,
     },
     /// This MainDevice controls the bus, and goes on with the process data of the other one; with its own if it was

@@ -56,13 +56,13 @@ impl Subjects {
     /// All subjects, also those of later versions.
     pub const ALL: Subjects = Subjects(u16::MAX);
 
-    /// With a further subject.
+    /// These subjects and a further one.
     #[must_use]
     pub const fn with(self, subject: Subject) -> Subjects {
         Subjects(self.0 | 1 << subject as u16)
     }
 
-    /// Without a subject.
+    /// These subjects without this one.
     #[must_use]
     pub const fn without(self, subject: Subject) -> Subjects {
         Subjects(self.0 & !(1 << subject as u16))

@@ -22,9 +22,9 @@ pub(crate) struct KnownDictionary {
     pub version: Option<Vec<u8>>,
     /// Indices of all objects, in the order of the SubDevice.
     pub indices: Vec<u16>,
-    /// By index.
+    /// Objects by index.
     pub objects: BTreeMap<u16, Object>,
-    /// By index and subindex.
+    /// Entries by index and subindex.
     pub entries: BTreeMap<u32, Entry>,
     /// Subindices without an entry.
     pub missing: BTreeSet<u32>,

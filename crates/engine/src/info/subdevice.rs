@@ -198,9 +198,9 @@ impl DataWord {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct MailboxSyncManagers {
-    /// Of the mailbox that the MainDevice writes.
+    /// SyncManager of the mailbox that the MainDevice writes.
     pub written: u8,
-    /// Of the mailbox that the MainDevice reads.
+    /// SyncManager of the mailbox that the MainDevice reads.
     pub read: u8,
 }
 

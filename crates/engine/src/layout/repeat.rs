@@ -46,7 +46,7 @@ impl Default for RepeatRule {
 }
 
 impl RepeatRule {
-    /// Nothing.
+    /// Nothing is sent again.
     pub const NEVER: RepeatRule = RepeatRule { outputs: OutputsAgain::Never, inputs: false };
 
     fn allows(self, direction: Direction) -> bool {

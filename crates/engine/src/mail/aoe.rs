@@ -96,7 +96,7 @@ pub struct AoeStates {
 }
 
 impl AoeStates {
-    /// These states.
+    /// States with these values.
     pub const fn new(ads: u16, device: u16) -> AoeStates {
         AoeStates { ads, device }
     }

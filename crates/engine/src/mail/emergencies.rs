@@ -148,7 +148,7 @@ impl EmergencyRings {
         self.rings.insert(subdevice, ring);
     }
 
-    /// A SubDevice no longer has this name.
+    /// A SubDevice no longer has this address.
     pub(crate) fn forget(&mut self, subdevice: Address) {
         self.rings.remove(&subdevice);
     }

@@ -127,7 +127,7 @@ pub struct Declaration {
 pub enum Required {
     /// All that are declared, optional or not.
     All,
-    /// Those that are not optional.
+    /// All declared SubDevices that are not optional.
     #[default]
     Mandatory,
     /// None. A present one that cannot be set up as declared (PDOs, SDOs, SYNC signals, places of its process data)

@@ -28,7 +28,7 @@ pub(super) struct Configuration {
 }
 
 impl Configuration {
-    /// Of a declaration and the options.
+    /// The configuration of a declaration and the options.
     pub fn of(declaration: &Declaration, options: &Options) -> Configuration {
         let mut items = Vec::with_capacity(COMMON + ConfigPart::ALL.len() * declaration.subdevices.len());
         items.push(parameters(declaration, options));

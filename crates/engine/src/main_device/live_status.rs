@@ -75,7 +75,7 @@ pub struct SegmentStatus {
 }
 
 impl LiveStatus {
-    /// Of an application with this board.
+    /// The live status of an application with this board.
     pub(super) fn of(board: &Arc<Board>) -> LiveStatus {
         LiveStatus { board: board.clone() }
     }

@@ -30,7 +30,7 @@ pub enum RegisterError {
     Plan {
         /// Index in the declaration.
         subdevice: SubDeviceId,
-        /// Why.
+        /// What does not fit.
         error: PlanError,
     },
     /// The SubDevice was not found, and its PDOs with all entries are not declared: the places are unknown.

@@ -213,7 +213,8 @@ plain! {
         pub resent: u64,
         /// Datagrams that were given up.
         pub timed_out: u64,
-        /// Mails that no request waited for and that were not fetched in time: lost answers.
+        /// Mailbox messages that arrived when no read waited for them, and were dropped because they were not fetched
+        /// in time: lost answers.
         pub mails_dropped: u64,
     }
 }

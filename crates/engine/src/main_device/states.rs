@@ -22,16 +22,16 @@ pub enum SubDeviceState {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct GroupState {
-    /// SubDevices of it that answer.
+    /// SubDevices of the group that answer.
     pub present: usize,
-    /// SubDevices of it in their declared states.
+    /// SubDevices of the group in their declared states.
     pub settled: usize,
-    /// All SubDevices of it.
+    /// All SubDevices of the group.
     pub members: usize,
 }
 
 impl GroupState {
-    /// All of them are in their declared states.
+    /// Whether all SubDevices of the group are in their declared states.
     pub const fn has_joined(&self) -> bool {
         self.settled == self.members
     }

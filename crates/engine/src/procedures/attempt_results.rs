@@ -12,7 +12,7 @@ type AttemptResult = Result<(), ConfigureError>;
 /// The number of an attempt that has ended, and its result.
 type Ended = Option<(u32, AttemptResult)>;
 
-/// By member, the last attempt that has ended.
+/// The last attempt of each member that has ended, by index.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct AttemptResults(Rc<RefCell<Vec<Ended>>>);
 

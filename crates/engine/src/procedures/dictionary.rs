@@ -28,9 +28,9 @@ const LIMITS: Limits = Limits::new(Duration::from_millis(100), Duration::from_se
 pub(crate) enum Dictionary {
     /// The PDOs of all SyncManagers for process data.
     Held(Vec<PdoAssignment>),
-    /// It has no such objects: the SII counts.
+    /// It has no objects of PDOs: those of the SII are used.
     None,
-    /// It cannot be read; the reason. The SII counts.
+    /// It cannot be read; the reason. The PDOs of the SII are used.
     Unreadable(String),
     /// Frames were lost, or the mailbox was closed: nothing is known of it.
     Interrupted,

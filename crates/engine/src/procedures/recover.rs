@@ -145,7 +145,8 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
 
 /// The SubDevice has refused a state because another request took effect meanwhile: it was in another state than the
 /// preceding one (AL status code 0x0011), or PREOP was requested before its mailboxes were enabled (0x0016), or SAFEOP
-/// before its process data was configured (0x001D, 0x001E). INIT, and PREOP after INIT, are always valid requests.
+/// before its process data was configured (0x001D, 0x001E). A refusal of INIT or PREOP with one of these codes is
+/// always due to another request: INIT, and PREOP after INIT, are valid requests.
 fn was_changed(error: &ConfigureError) -> bool {
     let ConfigureError::State(al_state::StateError::Refused { requested, status, code }) = error else { return false };
     let is_early =

@@ -40,7 +40,7 @@ const SCANS: u32 = 3;
 pub(crate) struct Before {
     /// All SubDevices with a station address: those that the scan found, then others.
     pub all: Vec<Known>,
-    /// Those that the scan found, with their connections.
+    /// The SubDevices that the scan found, with their connections.
     pub found: Found,
     pub handover: Handover,
 }

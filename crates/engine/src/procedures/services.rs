@@ -71,7 +71,7 @@ pub enum ServiceError {
     Unsteady,
     /// More datagrams than allowed per call.
     TooMany {
-        /// Their number.
+        /// Number of datagrams.
         got: usize,
         /// The limit.
         limit: usize,

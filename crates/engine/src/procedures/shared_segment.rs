@@ -61,7 +61,7 @@ pub struct SharedSegment {
 /// Data beside the model.
 #[derive(Debug)]
 pub struct Beside {
-    /// By member.
+    /// Mailboxes of the members, by index.
     pub mailboxes: Vec<Mailbox>,
     /// SII contents read before.
     pub cache: SiiCache,

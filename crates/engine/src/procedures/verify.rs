@@ -33,9 +33,9 @@ struct Suspect {
 
 /// Result of a check.
 enum Found {
-    /// It holds the written values.
+    /// The SubDevice holds the written values.
     Right(Suspect),
-    /// It does not; the difference.
+    /// The SubDevice holds other values; the difference.
     Wrong(Suspect, String),
 }
 

@@ -91,7 +91,7 @@ impl Default for RoleControl {
 }
 
 impl RoleControl {
-    /// With a first role.
+    /// A control that begins with this role.
     pub fn new(role: MainDeviceRole) -> RoleControl {
         let words = Words {
             role: AtomicU8::new(code(role)),
@@ -168,7 +168,7 @@ impl RoleControl {
         };
     }
 
-    /// These reasons.
+    /// The reasons that are set.
     pub fn not_ready(&self) -> u16 {
         self.words.not_ready.load(Ordering::Relaxed)
     }

@@ -55,7 +55,7 @@ enum Request {
 pub(super) struct Attention {
     /// The state of the ring that had been reported when the last round began.
     reported: RingState,
-    /// Other triggers.
+    /// Requested round, by other triggers than posted words.
     request: Request,
     next_routine: Instant,
     reads: Reads,

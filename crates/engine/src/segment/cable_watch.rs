@@ -14,7 +14,7 @@ const AGAIN: Duration = Duration::from_secs(10);
 /// Recent errors of a cable.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct CableWatch {
-    /// Since its last report.
+    /// Errors since the last report of the cable.
     unreported: CableErrors,
     /// There were damaged frames at the previous reading too.
     continues: bool,

@@ -9,7 +9,8 @@ pub enum Retries {
     /// It is repeated after pauses of 100 ms to 5 s, without end; after a loss of frames the first pauses are shorter.
     #[default]
     Always,
-    /// The SubDevice stays as it is until a retry is requested. Losses of frames are repeated at any rate.
+    /// The SubDevice stays as it is until a retry is requested. An attempt that failed because frames were lost is
+    /// repeated in any case.
     OnRequest,
 }
 
@@ -17,12 +18,12 @@ pub enum Retries {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ReadPdos {
-    /// None.
+    /// No dictionaries.
     Never,
-    /// Those of SubDevices whose SII assigns no PDO to a SyncManager for process data that is in use.
+    /// Dictionaries of SubDevices whose SII assigns no PDO to a SyncManager for process data that is in use.
     #[default]
     Missing,
-    /// Those of all SubDevices with CoE.
+    /// Dictionaries of all SubDevices with CoE.
     Always,
 }
 

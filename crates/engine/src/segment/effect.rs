@@ -44,11 +44,11 @@ pub enum Effect {
 /// Check before a SubDevice is configured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Check {
-    /// Nothing.
+    /// No check.
     None,
     /// Whether it is the member, by its identity: another SubDevice may have its station address.
     Identity,
-    /// The same for a lost member, by the registers written to it before: the SubDevice may be one of an earlier
+    /// Whether it is the lost member, by the registers written to it before: the SubDevice may be one of an earlier
     /// session.
     Return,
 }

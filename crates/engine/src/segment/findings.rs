@@ -37,7 +37,7 @@ pub enum ScanFinding {
 /// Findings about the cabling.
 #[derive(Clone, Debug, Default)]
 pub struct CablingFindings {
-    /// By position of the SubDevice.
+    /// Findings, each with the position of the SubDevice.
     pub findings: Vec<(Position, Finding)>,
     /// The cables of the main and the redundant link are swapped.
     pub are_swapped: bool,

@@ -55,7 +55,7 @@ pub(super) struct Rescans {
 /// The procedure of idle operation that works on the segment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Work {
-    /// None.
+    /// No procedure.
     #[default]
     Nothing,
     /// The first scan.

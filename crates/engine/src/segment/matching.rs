@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 /// How well an unassigned SubDevice matches an absent one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fit {
-    /// It is another one.
+    /// It is another SubDevice.
     No,
     /// Its SII cannot be read: it may be the absent one, and occupies its place.
     Unreadable,

@@ -61,7 +61,7 @@ pub struct Declared {
 }
 
 impl Default for Declared {
-    /// Nothing.
+    /// Nothing is declared.
     fn default() -> Declared {
         Declared {
             subdevices: SubDevices::default(),

@@ -65,7 +65,7 @@ pub enum ProcessDataStep {
     Off,
     /// Its FMMUs are about to be cleared.
     Unmapped,
-    /// Both: no part, and its FMMUs are about to be cleared.
+    /// It takes no part, and its FMMUs are about to be cleared.
     Left,
     /// Its FMMUs are about to be set.
     Mapped,
@@ -103,7 +103,7 @@ pub enum MemberFinding<'a> {
     Configured(bool),
     /// Its registers do not hold the written values; the missing value.
     Undone(String),
-    /// They do, after its configuration was repeated.
+    /// Its registers hold the written values, after its configuration was repeated.
     Held,
     /// How it takes part in process data from now on.
     ProcessData(ProcessDataStep),
@@ -145,7 +145,7 @@ pub enum Observation<'a> {
     PartOfRound {
         /// Version of the model at the request.
         versions: Versions,
-        /// By member.
+        /// Readings of the members, by index.
         readings: &'a [Reading],
         /// Answers of SubDevices without a declaration.
         others: usize,
@@ -302,7 +302,7 @@ pub enum Observation<'a> {
         index: usize,
         /// The member's attempt when it was compared.
         attempt: u32,
-        /// Why.
+        /// What does not fit.
         reason: String,
     },
     /// An unassigned SubDevice may be this member, or another one of the same kind. It is refused as a misfit is.

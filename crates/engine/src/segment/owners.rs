@@ -17,7 +17,7 @@ impl Owners {
         Owners { all, anchors }
     }
 
-    /// By position.
+    /// The member at each position.
     pub fn all(&self) -> &[Option<usize>] {
         &self.all
     }

@@ -12,7 +12,7 @@ use super::versions::Versions;
 pub struct RoundResult<'a> {
     /// Version of the model at the start of the round.
     pub versions: Versions,
-    /// By member.
+    /// Readings of the members, by index.
     pub readings: &'a [Reading],
     /// Phase of each member when the round began.
     pub before: &'a [Phase],

@@ -24,7 +24,7 @@ pub struct Scan {
 }
 
 impl Scan {
-    /// Of a segment that does not answer.
+    /// The scan of a segment that does not answer.
     pub(crate) fn nothing() -> Scan {
         Scan { subdevices: Vec::new(), topology: Topology::build(&[], 0), main_count: 0, redundant_count: 0 }
     }
@@ -34,7 +34,7 @@ impl Scan {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Found {
-    /// By position.
+    /// SubDevices by position.
     pub subdevices: Vec<Rc<SubDeviceInfo>>,
     /// Their connections.
     pub topology: Topology,

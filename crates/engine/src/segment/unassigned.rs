@@ -1,5 +1,6 @@
 //! SubDevices that answer but have no assigned station address. If such a SubDevice is not declared it keeps a
-//! temporary address, and is evaluated again when a declared one is lost that was never there beside it.
+//! temporary address. When a declared SubDevice is lost it is evaluated again, unless it was known to be undeclared
+//! while the declared one answered.
 
 use alloc::vec::Vec;
 use core::ops::Deref;
@@ -32,7 +33,7 @@ pub struct Unassigned {
     pub reported: bool,
     /// Since this time several members are possible.
     pub(super) held_since: Option<Instant>,
-    /// Members that answered while it was known to be none of them: it is none of these, whatever its identity is.
+    /// Members that were lost after it was known to be undeclared: it is none of these, whatever its identity is.
     pub(super) beside: Vec<usize>,
     /// Where the PDOs of its SII are known from when it is read.
     pub(super) pdo_source: PdoSource,

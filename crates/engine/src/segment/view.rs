@@ -13,7 +13,7 @@ pub struct View {
     pub counts: (Wkc, Wkc),
     /// The state of the ring at that time.
     pub ring: RingWord,
-    /// By position.
+    /// Station addresses by position.
     pub stations: Vec<StationAddress>,
 }
 

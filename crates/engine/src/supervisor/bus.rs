@@ -232,7 +232,7 @@ impl Bus {
         self.submit(Request { redundant, ..Request::once(command, target, data) })
     }
 
-    /// Distributes a system time once with FRMW; `stations` is the reference clock on each link. SubDevices in front of
+    /// Distributes a system time once with FRMW; `stations` is the reference clock on each link. SubDevices upstream of
     /// the reference clock, or on a link without it, receive `time`, which is valid at `at` and adjusted to the
     /// departure of the frame. `expected` as for [`Bus::transfer`].
     pub fn distribute_time(

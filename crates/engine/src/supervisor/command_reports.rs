@@ -21,9 +21,9 @@ pub(crate) struct WrongCommand {
     pub command: Command,
     pub target: Target,
     pub expected: Wkc,
-    /// Of the last one.
+    /// Working counter of the last of these datagrams.
     pub got: Wkc,
-    /// Their number since the last report.
+    /// Number of datagrams since the last report.
     pub count: u32,
 }
 
@@ -31,14 +31,14 @@ pub(crate) struct WrongCommand {
 #[derive(Debug, Default)]
 pub(crate) struct CommandReports {
     is_on: bool,
-    /// With the time of the last report.
+    /// Kinds of datagrams, each with the time of its last report.
     kinds: Vec<(WrongCommand, Instant)>,
-    /// Those beyond the limit.
+    /// Datagrams of kinds beyond [`MOST`].
     others: Option<WrongCommand>,
 }
 
 impl CommandReports {
-    /// Begins or ends to take datagrams in.
+    /// Begins or ends the collection of datagrams.
     pub(crate) fn set_on(&mut self, is_on: bool) {
         *self = CommandReports { is_on, ..CommandReports::default() };
     }
@@ -68,7 +68,7 @@ impl CommandReports {
         Some(wrong)
     }
 
-    /// Those that have waited for an interval.
+    /// Kinds of datagrams that have waited for an interval: to be reported now.
     pub(crate) fn take_waiting(&mut self, now: Instant) -> Vec<WrongCommand> {
         let due = self.kinds.iter_mut().filter_map(|(known, at)| take_due(known, at, now));
         let mut due: Vec<WrongCommand> = due.collect();

@@ -30,7 +30,8 @@ pub struct AcyclicCounters {
     pub resent: u64,
     /// Datagrams that were given up because their frame was lost.
     pub timed_out: u64,
-    /// Mails that came when no request waited for them any more, and were not fetched in time: lost answers.
+    /// Mailbox messages that arrived when no read waited for them, and were dropped because they were not fetched in
+    /// time: lost answers.
     pub mails_dropped: u64,
 }
 

@@ -94,7 +94,8 @@ impl Outbox {
         other.or(urgent)
     }
 
-    /// The next urgent datagram: one of a group that is being packed is not passed by others.
+    /// The next urgent datagram. While a group is put into a frame, only urgent datagrams are taken, so that no other
+    /// datagram comes between those of the group.
     pub(crate) fn front_of_urgent(&self) -> Option<(TransferId, Rank)> {
         self.urgent.front().map(|id| (*id, Rank::Urgent))
     }

@@ -14,7 +14,7 @@ pub struct Posted {
     pub result: Option<u32>,
     /// The state of the ring.
     pub ring: RingWord,
-    /// By [`crate::link::Link::index`].
+    /// Carriers by [`crate::link::Link::index`]; `None` if the links do not report them.
     pub carriers: [Option<bool>; 2],
     /// Number of requests that a cyclic thread has started or cancelled.
     pub requests: u32,

@@ -175,7 +175,7 @@ impl Shared {
         timer
     }
 
-    /// Frames, datagrams and mails so far.
+    /// Counters of frames, datagrams and dropped mails so far.
     pub(super) fn counters(&self) -> AcyclicCounters {
         AcyclicCounters { mails_dropped: self.strays.dropped(), ..self.counters }
     }

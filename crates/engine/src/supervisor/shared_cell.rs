@@ -17,9 +17,9 @@ pub(crate) struct SharedCell {
 /// When there is work.
 #[derive(Clone, Copy)]
 struct Due {
-    /// Of [`super::Supervisor::poll`].
+    /// Deadline of [`super::Supervisor::poll`].
     deadline: Instant,
-    /// Of any kind: in the past for work that does not wait for a time.
+    /// Deadline of any work: in the past for work that does not wait for a time.
     any: Instant,
 }
 

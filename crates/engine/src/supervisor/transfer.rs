@@ -12,7 +12,7 @@ use super::reply::{BusError, Reply};
 use super::task::TaskId;
 use crate::time::Instant;
 
-/// What of a group of requests follows one of them in the same frame.
+/// Size of a group of requests, or of the rest of a group after one of its requests. A group is sent in one frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Rest {
     pub bytes: usize,
@@ -20,7 +20,7 @@ pub(crate) struct Rest {
 }
 
 impl Rest {
-    /// The last one of a group, or alone.
+    /// After the last request of a group, and after a request without a group.
     pub(super) const NONE: Rest = Rest { bytes: 0, datagrams: 0 };
 }
 
@@ -48,7 +48,7 @@ pub(crate) struct Request {
     pub polls: bool,
     /// It is sent before all datagrams that wait.
     pub urgent: bool,
-    /// The datagrams that follow in the same frame ([`super::Bus::transfer_together`]).
+    /// The requests that follow it in the same frame ([`super::Bus::transfer_together`]).
     pub rest: Rest,
     /// Number of further datagrams of the same kind before it, in a frame of their own.
     pub before: usize,
@@ -105,7 +105,7 @@ impl Request {
         preceding + (1 + self.before) * (OVERHEAD + self.data.len())
     }
 
-    /// It and the rest of its group in a frame.
+    /// Size of this request and of the rest of its group in a frame.
     pub(super) fn group(&self) -> Rest {
         Rest { bytes: self.bytes() + self.rest.bytes, datagrams: self.datagrams() + self.rest.datagrams }
     }

@@ -42,7 +42,7 @@ impl fmt::Display for PortOf {
 pub struct Connection {
     /// The side nearer to the main link.
     pub near: PortOf,
-    /// The other side.
+    /// The side farther from the main link.
     pub far: PortOf,
 }
 

@@ -144,7 +144,7 @@ pub struct General<'a> {
 }
 
 impl<'a> Details<'a> {
-    /// Those of a SubDevice.
+    /// The details of a SubDevice.
     pub fn new(known: &'a Known) -> Details<'a> {
         let Known { description: details, has_clock, ports } = known;
         let features = &details.features;

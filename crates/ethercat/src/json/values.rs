@@ -10,9 +10,9 @@ use crate::selection::state_name;
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Link {
-    /// The first one.
+    /// The main link.
     Main,
-    /// That at the other end of a ring.
+    /// The link at the other end of a ring.
     Redundant,
 }
 

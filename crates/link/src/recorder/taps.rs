@@ -205,7 +205,7 @@ impl FrameReader {
     /// other threads are in their queues too. Ends early with the first error of `take`; that frame is gone.
     ///
     /// # Errors
-    /// That of `take`.
+    /// The error of `take`.
     pub fn read<E>(&mut self, take: impl FnMut(FrameNote, &[u8]) -> Result<(), E>) -> Result<(), E> {
         self.take(false, take)
     }
@@ -213,7 +213,7 @@ impl FrameReader {
     /// Takes all frames that wait, in the order of their times as far as they are there.
     ///
     /// # Errors
-    /// That of `take`.
+    /// The error of `take`.
     pub fn read_all<E>(&mut self, take: impl FnMut(FrameNote, &[u8]) -> Result<(), E>) -> Result<(), E> {
         self.take(true, take)
     }

@@ -27,7 +27,7 @@ pub enum DaemonError {
     Lost,
     /// The daemon has taken the bus back before.
     TakenBack {
-        /// Why.
+        /// Reason of the daemon.
         cause: String,
     },
 }

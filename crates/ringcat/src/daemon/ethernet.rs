@@ -85,7 +85,7 @@ mod without {
             Ok(Ethernet)
         }
 
-        /// None was ordered.
+        /// No interface was ordered, so there is no answer to one.
         pub fn answered(&self, _name: String, _made: Result<OwnedFd, String>) {}
 
         /// Nothing was moved.

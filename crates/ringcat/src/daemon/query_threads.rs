@@ -13,7 +13,7 @@ use ringcat_control::refusal::Refusal;
 use super::serving::answer;
 use crate::supervisor_thread::SupervisorThread;
 
-/// Stack of each: a program may have locked its memory, and with it these.
+/// Stack of each thread. It is small because a program may lock its memory, and with it the stacks.
 const STACK_BYTES: usize = 256 << 10;
 /// Threads for queries that are answered by a mailbox: so many queries to slow SubDevices are possible at a time.
 const SLOW: usize = 3;

@@ -19,7 +19,7 @@ use super::query_threads::QueryThreads;
 use crate::services::Services;
 use crate::supervisor_thread::SupervisorThread;
 
-/// Stack of the thread: a program may have locked its memory, and with it this.
+/// Stack of the thread. It is small because a program may lock its memory, and with it the stack.
 const STACK_BYTES: usize = 512 << 10;
 /// Interval of checks for new events of scans, also while messages arrive.
 const LOOK: Duration = Duration::from_millis(200);

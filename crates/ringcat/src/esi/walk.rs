@@ -84,7 +84,7 @@ impl Walked {
         }
         entries.sort_unstable();
         for path in entries {
-            // Without an entry that was removed meanwhile.
+            // An entry that was removed meanwhile is skipped.
             let Ok(metadata) = fs::symlink_metadata(&path) else { continue };
             let may_be_folder = metadata.is_dir() || metadata.is_symlink();
             if metadata.is_dir() && depth == MAX_DEPTH {

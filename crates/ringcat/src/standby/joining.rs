@@ -28,7 +28,7 @@ const SLICE: Duration = Duration::from_millis(10);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Next {
-    /// It listens on: nothing is decided.
+    /// It continues to listen: it is not yet known whether there is an ACTIVE.
     Listen,
     /// There is an ACTIVE of which all is known: [`MainDevice::follow`].
     Follow,

@@ -215,7 +215,7 @@ impl Watch {
 pub(crate) struct Dice(u64);
 
 impl Dice {
-    /// Of a MainDevice with this main address.
+    /// Random times of a MainDevice with this main address.
     pub fn new(main: MacAddress, now: Instant) -> Dice {
         let [a, b, c, d, e, f] = main.0;
         let seed = u64::from_be_bytes([1, 0, a, b, c, d, e, f]).wrapping_mul(0x9E37_79B9_7F4A_7C15);

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 pub const UNDER_SYSTEMD: &str = "etc/ethercat.conf";
 /// The file of an init script.
 pub const WITHOUT_SYSTEMD: &str = "etc/sysconfig/ethercat";
-/// There under systemd (`sd_booted(3)`).
+/// This directory exists under systemd (`sd_booted(3)`).
 const SYSTEMD: &str = "run/systemd/system";
 
 /// The file that is used.

@@ -46,9 +46,9 @@ pub fn syncs_of(device: &DeviceDescription) -> Vec<SyncInfo> {
 /// PDOs that a program chooses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChosenPdos {
-    /// Those that the SubDevice has by default, by name.
+    /// PDOs that the SubDevice assigns by default, by name.
     Named,
-    /// Those that it does not assign by default; without such ones all but the last.
+    /// PDOs that it does not assign by default; without such PDOs all but the last.
     Others,
     /// Its default PDOs with their first entries only.
     Shortened,

@@ -36,11 +36,11 @@ const LOGGED: usize = 200;
 /// Requests that belong to the configuration.
 #[derive(Debug, Default)]
 pub struct Requests {
-    /// Of objects.
+    /// Requests for objects.
     pub sdo: Vec<SdoRequest>,
-    /// Of registers.
+    /// Requests for registers.
     pub register: Vec<RegisterRequest>,
-    /// Of IDNs.
+    /// Requests for IDNs.
     pub soe: Vec<SoeRequest>,
     /// Vendor messages.
     pub voe: Vec<VoeHandler>,

@@ -56,12 +56,12 @@ impl Network {
         self.host_log.as_mut().map(HostLog::take).unwrap_or_default()
     }
 
-    /// What a host does.
+    /// Condition of a host.
     pub fn condition(&self, host: Host) -> HostCondition {
         self.machines[host as usize].condition
     }
 
-    /// Since when it does that.
+    /// Time since which a host has been in this condition.
     pub fn condition_since(&self, host: Host) -> SimTime {
         self.machines[host as usize].since
     }

@@ -10,13 +10,13 @@ use super::pdo::Pdo;
 /// Distances of the indices of neighbouring slots or slot groups.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SlotDistances {
-    /// Of PDOs between slots.
+    /// Distance between the PDOs of neighbouring slots.
     pub pdo: Option<u16>,
-    /// Of objects between slots.
+    /// Distance between the objects of neighbouring slots.
     pub object: Option<u16>,
-    /// Of PDOs between groups.
+    /// Distance between the PDOs of neighbouring slot groups.
     pub group_pdo: Option<u16>,
-    /// Of objects between groups.
+    /// Distance between the objects of neighbouring slot groups.
     pub group_object: Option<u16>,
 }
 

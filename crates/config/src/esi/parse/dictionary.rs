@@ -23,7 +23,8 @@ pub(super) fn dictionary(element: Element<'_>) -> Result<Dictionary, EsiError> {
     }
     data_types.sort_by(|a, b| a.name.cmp(&b.name).then(a.line.cmp(&b.line)));
     for pair in data_types.windows(2).filter(|pair| pair[0].name == pair[1].name) {
-        element.note(format!("DataType \"{}\": the one of line {} counts", pair[0].name, pair[0].line));
+        let (name, line) = (&pair[0].name, pair[0].line);
+        element.note(format!("DataType \"{name}\" is defined several times: the one in line {line} is used"));
     }
     data_types.dedup_by(|later, first| later.name == first.name);
     let mut objects: Vec<Object> = Vec::new();
@@ -33,7 +34,7 @@ pub(super) fn dictionary(element: Element<'_>) -> Result<Dictionary, EsiError> {
         match lines.entry(object.index) {
             Entry::Occupied(first) => {
                 let (index, line) = (object.index.index, first.get());
-                of.note(format!("Object {index:#06x} of line {line} is there already: not used"));
+                of.note(format!("Object {index:#06x} is defined in line {line} already: not used"));
             }
             Entry::Vacant(place) => {
                 place.insert(object.line);

@@ -16,7 +16,7 @@ pub(super) fn pdos(parent: Element<'_>, name: &str) -> Result<Vec<Pdo>, EsiError
         match lines.entry(pdo.index) {
             Entry::Occupied(first) => {
                 let (index, line) = (pdo.index.index, first.get());
-                element.note(format!("{name} {index:#06x} of line {line} is there already: not used"));
+                element.note(format!("{name} {index:#06x} is defined in line {line} already: not used"));
             }
             Entry::Vacant(place) => {
                 place.insert(pdo.line);

@@ -23,7 +23,7 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    /// As messages name it.
+    /// Index and name, for messages.
     pub fn label(&self) -> String {
         let name = self.pdo.name.english().trim();
         let name = if name.is_empty() { String::new() } else { format!(" \"{}\"", name.escape_debug()) };

@@ -86,7 +86,7 @@ fn unknown(node: usize, fork: usize, range: Option<(i64, i64)>) -> Unknown {
 // covers: 7.1, dc-delays
 #[test]
 fn behind_forks_without_a_clock_delays_are_known_within_a_branch_only() {
-    // The junction in front has no clock: no clock measures the path through it, but the branches have clocks.
+    // The junction upstream has no clock: no clock measures the path through it, but the branches have clocks.
     let topology = tree(4, &[(0, 3, 1), (0, 1, 2), (2, 1, 3)]);
     let all = [None, times([0; 4]), times([0, 780, 0, 0]), times([0; 4])];
     let delays = propagation(&topology, &all);
@@ -144,7 +144,7 @@ fn delays_behind_forks_are_exact_after_each_branch_was_measured_alone() {
 // covers: 7.5, dc-delays
 #[test]
 fn a_stub_of_the_redundant_link_has_the_same_delay_differences() {
-    // dc_delay.py: slaves 4 and 3 from the redundant link, the break in front of 3; the head is node 0.
+    // dc_delay.py: slaves 4 and 3 from the redundant link, the break before 3; the head is node 0.
     let mut topology = tree(2, &[(0, 1, 1)]);
     topology.main_count = 0;
     topology.redundant_head = Some(0);

@@ -158,7 +158,7 @@ impl ObjectDictionary {
                 Ok(entry) => {
                     kept.add(&known, bytes_of_entry(entry), |known| known.keep_entry(entry.clone()));
                 }
-                // Those of PDOs exist or not by what is mapped.
+                // Not for PDO objects: which of their entries exist depends on the current mapping.
                 Err(InformationError::Refused(AbortCode::SUB_INDEX_DOES_NOT_EXIST)) if address.0 >= PROFILE => {
                     kept.add(&known, MISSING_BYTES, |known| known.keep_missing(address));
                 }
@@ -252,7 +252,7 @@ impl ObjectDictionary {
         match read(&self.mailbox, SdoAddress::new(SOFTWARE_VERSION, 0), limits, MOST_VERSION).await {
             Ok(version) => Ok(Some(version)),
             Err(error) if matches!(error.cause, SdoFailure::Aborted(_)) => {
-                // Nothing of the application failed.
+                // This read is not one of the application, whose last error must stay.
                 self.mailbox.forget_protocol_error(before);
                 Ok(None)
             }

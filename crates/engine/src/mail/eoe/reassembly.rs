@@ -27,7 +27,7 @@ pub(super) enum Outcome {
 /// Incomplete frames.
 #[derive(Debug, Default)]
 pub(super) struct Reassembly {
-    /// By the number of the frame.
+    /// Parts of frames, with the number of the frame.
     frames: Vec<(u8, Partial)>,
 }
 

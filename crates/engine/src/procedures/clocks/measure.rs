@@ -45,7 +45,7 @@ const CLOSING: Duration = Duration::from_millis(50);
 /// The SubDevices that answer, in the order in which frames pass them.
 #[derive(Clone, Debug)]
 struct Survey {
-    /// Of the clocks, when it began.
+    /// Versions of the clocks when the survey began.
     versions: ClockVersions,
     stations: Vec<StationAddress>,
     dl_status: Vec<DlStatus>,
@@ -65,7 +65,7 @@ struct Survey {
 /// Ports that may be closed for a moment, for measuring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Opening {
-    /// None.
+    /// No ports.
     Nothing,
     /// Ports that make a ring a line: all SubDevices stay in reach.
     Rings,

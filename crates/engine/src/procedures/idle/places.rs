@@ -3,7 +3,7 @@
 //! Another program may write a station address. If the SubDevice that had this address leaves meanwhile, the address is
 //! unique and known, but names another SubDevice. The same happens when a part of the segment comes that was isolated
 //! during the last scan and kept addresses of an earlier one. A SubDevice that is where it was is not read: counted
-//! from its link, its address is at the same place as before, and no SubDevice in front of it has opened or closed a
+//! from its link, its address is at the same place as before, and no SubDevice upstream of it has opened or closed a
 //! port since.
 
 use alloc::rc::Rc;
@@ -93,7 +93,7 @@ fn unchanged_parts(are_as_before: &[bool], main_count: usize, is_closed: bool) -
     let main = are_as_before.iter().take(main_count).take_while(|as_before| **as_before).count();
     let reached = if is_closed { count } else { count.saturating_sub(main_count) };
     let redundant = are_as_before.iter().rev().take(reached).take_while(|as_before| **as_before).count();
-    // The first one with other ports is itself in front of what came.
+    // The first SubDevice with other ports is upstream of the change: it is at the same place as before.
     ((main + 1).min(main_count), count - (redundant + 1).min(reached))
 }
 

@@ -56,13 +56,13 @@ struct Ring {
 /// The sides from which frames enter a ring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Sides {
-    /// None.
+    /// From neither side.
     Neither,
-    /// Both, as in normal operation: at its beginning, and at its end if it is broken.
+    /// From both sides, as in normal operation: at its beginning, and at its end if it is broken.
     Both,
-    /// At its beginning only. If the ring is whole, frames do not return.
+    /// From its beginning only. If the ring is whole, frames do not return.
     Beginning,
-    /// At its end only. If the ring is whole, frames do not return.
+    /// From its end only. If the ring is whole, frames do not return.
     End,
 }
 

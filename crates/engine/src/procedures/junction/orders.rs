@@ -23,9 +23,9 @@ impl Drop for UnderWay {
     }
 }
 
-/// Registers that bytes are about to be written from a register on, until the returned value is dropped. `None` if the
+/// Records a write of these bytes from a register on as under way, until the returned value is dropped. `None` if the
 /// write does not concern lasting settings of ports. A measurement that changes ports may begin while the write is
-/// under way: so the write is registered even if no procedure observes these ports yet.
+/// under way: so the write is recorded even if no procedure observes these ports yet.
 pub(crate) fn ordering(
     segment: &SharedSegment,
     station: StationAddress,

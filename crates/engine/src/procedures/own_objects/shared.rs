@@ -12,7 +12,7 @@ use super::upload::Upload;
 /// Data shared by all clients, and their uploads.
 #[derive(Debug, Default)]
 pub(super) struct Shared {
-    /// By client.
+    /// Uploads by client.
     pub uploads: RefCell<BTreeMap<u64, Upload>>,
     pub detection: Rc<Detection>,
     pub rates: RefCell<Rates>,

@@ -16,7 +16,7 @@ use crate::role::NotPermitted;
 pub struct NotFollowed {
     /// The SubDevice.
     pub subdevice: Address,
-    /// Why.
+    /// Reason why it did not follow.
     pub reason: NotFollowedReason,
 }
 
@@ -32,7 +32,7 @@ pub enum NotFollowedReason {
     InBoot,
     /// Another state was requested of it meanwhile.
     Overtaken,
-    /// It was not there at the limit; the request continues.
+    /// It had not reached the state at the time limit; the request continues.
     Late {
         /// Its AL status at the limit.
         status: AlStatus,
@@ -51,7 +51,7 @@ pub enum StatesError {
     Boot,
     /// Nothing is declared, and no SubDevice was found.
     NoSubDevices,
-    /// These did not follow.
+    /// Some SubDevices did not follow.
     NotFollowed {
         /// The requested state.
         state: AlState,

@@ -30,7 +30,7 @@ pub struct AlRegisters {
 }
 
 impl AlRegisters {
-    /// These values.
+    /// Registers with these values.
     pub const fn new(status: AlStatus, code: AlStatusCode) -> AlRegisters {
         AlRegisters { status, code }
     }

@@ -37,7 +37,7 @@ pub enum ChainEnd {
         /// The end marker.
         at: usize,
     },
-    /// Without an end marker.
+    /// No end marker was found.
     Open {
         /// The byte at which it was expected.
         at: usize,

@@ -17,7 +17,7 @@ pub struct EepromTurns {
 }
 
 impl EepromTurns {
-    /// None is used.
+    /// No EEPROM is used yet.
     pub fn new(bus: &Bus) -> EepromTurns {
         EepromTurns { used: Rc::default(), changed: bus.signal() }
     }

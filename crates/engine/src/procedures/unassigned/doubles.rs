@@ -21,7 +21,7 @@ use crate::supervisor::{Bus, BusError};
 pub(in super::super) enum Mark {
     /// It holds the FMMUs that were written to the member.
     Borne,
-    /// It does not hold them.
+    /// It does not hold the FMMUs that were written to the member.
     Missing,
     /// No process data is mapped for the member at present.
     Unmapped,
@@ -136,7 +136,7 @@ async fn keeper(
     Ok(if let [only] = bearers[..] { Some(only) } else { None })
 }
 
-/// Only position and identity decide.
+/// The member by position and identity only.
 async fn by_place(
     bus: &Bus,
     segment: &SharedSegment,

@@ -26,7 +26,7 @@ pub struct ClockChanges {
 }
 
 impl ClockChanges {
-    /// Those with which another application begins.
+    /// The values with which another application begins.
     pub const fn of_next(self) -> ClockChanges {
         ClockChanges { set_ups: self.set_ups.wrapping_add(1), ..self }
     }

@@ -35,7 +35,7 @@ pub struct Running {
     pub unwritten: Unwritten,
     /// The registers to write next.
     pub due: Due,
-    /// Whether all clocks have reached the window.
+    /// Whether all required clocks have reached the window.
     pub lock: Lock,
     /// The links of the last answers, if they contradict the known links: the next answers must confirm them.
     pub unconfirmed: Option<BTreeMap<StationAddress, Option<Link>>>,
@@ -54,7 +54,7 @@ pub enum Compensation {
 /// Whether the known delays are those of the segment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Delays {
-    /// They are.
+    /// The known delays are those of the segment.
     #[default]
     Valid,
     /// The segment has changed since they were measured, first at this time.
@@ -75,7 +75,7 @@ pub struct Unwritten {
 /// The registers to write next.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Due {
-    /// None.
+    /// No registers.
     #[default]
     Nothing,
     /// Delays, before any time is distributed again.
@@ -86,12 +86,12 @@ pub enum Due {
     Offsets,
 }
 
-/// Whether all clocks have reached the window.
+/// Whether all required clocks have reached the window.
 #[derive(Debug, Default)]
 pub enum Lock {
-    /// Not yet.
+    /// Not all have reached it yet.
     #[default]
     Open,
-    /// They have. While some clocks receive the time predicted by the host, this evaluates the differences.
+    /// All have reached it. While some clocks receive the time predicted by the host, this evaluates the differences.
     Locked(SyncWindow),
 }

@@ -45,7 +45,7 @@ pub enum ClockObservation<'a> {
     Signals {
         /// The clock.
         key: ClockKey,
-        /// They are being started.
+        /// The signals are being started; otherwise they are off.
         are_starting: bool,
     },
     /// The exchange has taken over a shift: it reports how far all offsets are set back.
@@ -86,7 +86,7 @@ pub enum ClockFinding<'a> {
     MeasuredAgain(&'a Measured),
     /// The delays of the clocks on a link are written.
     DelaysWritten(Link),
-    /// They could not be written, for this reason.
+    /// The delays could not be written; the reason.
     DelaysNotWritten(String),
     /// The measurement has ended and its delays are written, or the segment could not be measured for too long.
     MeasurementEnded {

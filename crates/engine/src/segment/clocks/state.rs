@@ -39,7 +39,7 @@ pub struct Clocks {
     pub(in crate::segment) life: Life,
     /// Changes so far.
     pub(in crate::segment) changes: ClockChanges,
-    /// By position of the scan, then later ones.
+    /// Clocks by position of the scan, then clocks that came later.
     pub nodes: Vec<Node>,
     /// The reference.
     pub reference: Option<StationAddress>,
@@ -190,13 +190,13 @@ impl Clocks {
     }
 
     /// Whether OP requires that the clock is locked: it has SYNC signals or follows the reference. A clock without SYNC
-    /// signals in front of the reference receives the host's estimate of the time: it never locks if the host sends
+    /// signals upstream of the reference receives the host's estimate of the time: it never locks if the host sends
     /// hundreds of microseconds late, and its time controls nothing.
     pub fn is_required(&self, node: &Node) -> bool {
         node.has_clock && (node.is_configured || !self.is_in_front(node))
     }
 
-    /// Whether the clock is required and answers: no SubDevice waits for the clock of an absent one.
+    /// Whether the clock is required and its SubDevice answers: no SubDevice waits for the clock of an absent one.
     pub fn is_waited_for(&self, node: &Node) -> bool {
         self.is_required(node) && node.link.is_some()
     }

@@ -34,7 +34,7 @@ pub struct ClockStatus {
     /// It was within the window for as many samples as configured.
     pub is_locked: bool,
     /// Whether OP requires that the clock is locked: it has SYNC signals or follows the reference. A clock without SYNC
-    /// signals in front of the reference follows the host's estimate of the time, and no SubDevice waits for it.
+    /// signals upstream of the reference follows the host's estimate of the time, and no SubDevice waits for it.
     pub is_required: bool,
 }
 

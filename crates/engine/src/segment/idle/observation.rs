@@ -33,7 +33,7 @@ pub enum IdleObservation<'a> {
         /// Number of the request that it answers.
         wanted: Option<u64>,
     },
-    /// It has failed; the reason, unless the segment has changed meanwhile.
+    /// The scan after a change has failed; the reason, unless the segment has changed meanwhile.
     NotFollowed(Option<String>),
     /// The states of all SubDevices with a requested state were read.
     StatesRead(&'a [StateRead]),
@@ -42,7 +42,7 @@ pub enum IdleObservation<'a> {
     /// The scan under way reads EEPROMs from now on; addresses for which it has found that no SubDevice, or several,
     /// have them.
     ReadingBegun(&'a [StationAddress]),
-    /// It no longer does.
+    /// The scan under way reads no further EEPROMs.
     ReadingEnded,
     /// The ring is about to be opened for a measurement: broadcasts show nothing of the segment until it has ended.
     Measuring,

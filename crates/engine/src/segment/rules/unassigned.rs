@@ -144,7 +144,7 @@ impl Segment {
         }
     }
 
-    /// A member that answered no longer does. SubDevices that were known to be undeclared then are others.
+    /// A member no longer answers. SubDevices that are known to be undeclared at this time are not this member.
     pub(in crate::segment) fn tell_apart(&mut self, index: usize) {
         for (_, knowledge, it) in self.subdevices.all_unassigned_mut() {
             if it.reported && knowledge.info().is_some() && !it.beside.contains(&index) {

@@ -12,7 +12,8 @@ use crate::time::Instant;
 
 /// Pause before the first attempt after a refusal; it doubles with every failure.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
-/// The same after a loss of frames: outputs may be held meanwhile, until a watchdog of 100 ms expires.
+/// Pause before the first attempt after a loss of frames, shorter because held outputs stay until a watchdog of 100 ms
+/// expires.
 const FIRST_PAUSE_OF_BUS: Duration = Duration::from_millis(5);
 /// Longest pause between attempts.
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
@@ -24,7 +25,7 @@ pub enum UpkeepProgress {
     Due(Instant),
     /// An attempt is under way.
     UnderWay,
-    /// It was reached.
+    /// The requested state was reached.
     Reached,
     /// The application has forced a state: it is left as it is until another state is requested.
     Left,

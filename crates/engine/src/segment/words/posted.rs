@@ -12,7 +12,7 @@ use crate::ring_status::LinkCounts;
 pub struct Words {
     /// The links in use.
     pub(super) links: LinkSet,
-    /// By [`Link::index`].
+    /// Carriers by [`Link::index`]; `None` if the links do not report them.
     pub(super) carriers: [Option<bool>; 2],
     /// The state of the ring.
     pub(super) ring: RingWord,

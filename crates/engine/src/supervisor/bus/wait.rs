@@ -84,7 +84,7 @@ impl Bus {
         .await
     }
 
-    /// Sends datagrams one after another, others that wait may come between, and waits for all replies; returns the
+    /// Sends datagrams in their order, possibly with other datagrams between them. Waits for all replies; returns the
     /// first error.
     pub async fn transfer_all(
         &self,
@@ -99,8 +99,9 @@ impl Bus {
         self.replies(requests).await
     }
 
-    /// Sends datagrams in one frame, before all that wait, and again in one frame if it is lost; waits for all replies
-    /// and returns the first error. What is longer than a frame, or than [`Bus::max_datagrams`], takes several.
+    /// Sends datagrams in one frame, before all queued datagrams, and again in one frame if it is lost. Waits for all
+    /// replies; returns the first error. Datagrams that do not fit into one frame, or are more than
+    /// [`Bus::max_datagrams`], take several frames.
     pub(crate) async fn transfer_together(
         &self,
         datagrams: impl IntoIterator<Item = (Command, Target, Vec<u8>)>,

@@ -93,7 +93,7 @@ impl Shared {
                 if transfer.abandoned {
                     self.outbox.pop(rank);
                     self.transfers.remove(id);
-                    // So is the rest of its group.
+                    // The rest of its group is abandoned as well.
                     follows = false;
                     continue;
                 }

@@ -1,8 +1,8 @@
-//! Datagrams that leave in one frame whatever waits, and in one frame again if it is lost.
+//! Datagrams that are sent in one frame whatever else is queued, and again in one frame if the frame is lost.
 
 use super::*;
 
-/// The loop settings of two SubDevices.
+/// The loop settings of three SubDevices.
 fn writes() -> Vec<(Command, Target, Vec<u8>)> {
     let write = |station| (Command::Fpwr, Target::Station(StationAddress(station), map::DL_CONTROL), vec![0; 2]);
     vec![write(1), write(2), write(3)]
@@ -20,7 +20,7 @@ fn in_frames(sent: &[(Link, Vec<u8>)]) -> Vec<usize> {
     sent.iter().map(of_frame).filter(|writes| *writes > 0).collect()
 }
 
-/// A MainDevice whose frames have datagrams before those of [`writes`]: `urgent` ones, and one of `long` bytes.
+/// A MainDevice that has queued other datagrams before those of [`writes`]: `urgent` ones, and one of `long` bytes.
 fn loaded(urgent: u16, long: usize, together: bool) -> Bench {
     let mut bench = Bench::new(LinkSet::Single);
     for station in 0..urgent {
@@ -42,7 +42,7 @@ fn loaded(urgent: u16, long: usize, together: bool) -> Bench {
     bench
 }
 
-/// Sends frames in windows of this many bytes until all has left.
+/// Sends frames in windows of this many bytes until all datagrams are sent.
 fn send(bench: &mut Bench, window: usize) {
     for _ in 0..50 {
         let sent = &mut bench.sent;
@@ -53,7 +53,7 @@ fn send(bench: &mut Bench, window: usize) {
 
 // covers: registers
 #[test]
-fn writes_that_belong_together_leave_in_one_frame_whatever_waits() {
+fn grouped_writes_are_sent_in_one_frame_whatever_else_is_queued() {
     let mut split = 0;
     for urgent in 0..60 {
         for long in [0, 1400, 1430, 1440, 1450, 1460, 1480] {
@@ -72,7 +72,7 @@ fn writes_that_belong_together_leave_in_one_frame_whatever_waits() {
 
 // covers: registers
 #[test]
-fn writes_of_a_lost_frame_leave_in_one_frame_again() {
+fn grouped_writes_of_a_lost_frame_are_sent_again_in_one_frame() {
     for window in [60, 70, 90, 1514] {
         let mut bench = loaded(0, 0, true);
         send(&mut bench, window);
@@ -80,7 +80,7 @@ fn writes_of_a_lost_frame_leave_in_one_frame_again() {
             assert_eq!(in_frames(&bench.sent), [3], "windows of {window}");
             bench.sent.clear();
             bench.pass(Duration::from_millis(200));
-            // Another one waits when the loss is found.
+            // Another datagram is queued when the loss is detected.
             let bus = bench.supervisor.bus();
             bench.start(async move { bus.fprd(STATION, map::PROCESS_RAM, 1470).await });
             bench.supervisor.poll(bench.now);
@@ -90,7 +90,7 @@ fn writes_of_a_lost_frame_leave_in_one_frame_again() {
 }
 
 #[test]
-fn given_up_writes_leave_no_place_for_others_outside_of_the_window() {
+fn the_send_window_applies_again_after_an_abandoned_group() {
     let mut bench = Bench::new(LinkSet::Single);
     let bus = bench.supervisor.bus();
     bench.start(async move { bus.within(Duration::ZERO, bus.transfer_together(writes(), Some(Wkc(1)))).await });
