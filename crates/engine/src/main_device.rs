@@ -5,68 +5,28 @@
 //! supervision, and returns the [`Exchange`](crate::exchange::Exchange) for the application's cyclic thread.
 
 mod activate;
-mod activate_error;
 mod active;
-mod areas;
 mod bus_control;
 mod clients;
 mod clocks;
-mod commands;
-mod datagrams;
 mod declaration;
-mod declare;
-mod ethernet;
-#[cfg(feature = "standby")]
-mod follow;
 mod found;
 mod function;
-mod gateway;
 mod handover;
-#[cfg(feature = "standby")]
-mod identity;
 mod idle;
-mod image_memory;
-mod lay_out;
-#[cfg(feature = "standby")]
-mod listen;
-#[cfg(feature = "standby")]
-mod listener;
 mod live_status;
-mod loaded;
-mod lrw;
-mod mail;
-mod memories;
-mod messages;
-mod obstacles;
 mod options;
-#[cfg(feature = "standby")]
-mod partner_ethernet;
 mod pending;
-mod prepare;
-#[cfg(feature = "standby")]
-mod redundancy;
-mod register_error;
-mod registered;
-mod registered_area;
-mod registration;
-mod repeats;
 mod sampling;
 mod scanning;
-mod sent_once;
 mod services;
 pub mod snapshot;
 #[cfg(feature = "standby")]
 mod standby;
-#[cfg(feature = "standby")]
-mod standby_options;
 mod state_of_all;
 mod states;
 mod steps;
-#[cfg(feature = "standby")]
-mod take_over;
-mod tool;
 mod turns;
-mod working_counters;
 
 use alloc::collections::BTreeMap;
 use alloc::rc::Rc;
@@ -78,25 +38,25 @@ use core::time::Duration;
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
 
-pub use activate_error::ActivateError;
+pub use activate::activate_error::ActivateError;
+pub use activate::obstacles::{obstacles, replaced_reference};
+pub use activate::sent_once::SentOnce;
 pub use active::Active;
-pub use areas::{AreaEntries, Directory, ObjectOf, PlacedEntry};
-pub use datagrams::{MAX_DATAGRAMS, RawDatagram};
+pub use declaration::areas::{AreaEntries, Directory, ObjectOf, PlacedEntry};
+pub use declaration::image_memory::ImageMemory;
+pub use declaration::register_error::RegisterError;
+pub use declaration::registered_area::{EntryPlace, RegisteredArea};
 pub use declaration::{Declaration, DeclaredGroup, DomainConfig, DomainMember, ExplicitLrw, MAX_UNDER_WAY, Required};
-pub use ethernet::EthernetSubDevice;
 pub use found::DeclaredSubDevice;
-pub use image_memory::ImageMemory;
-#[cfg(feature = "standby")]
-pub use listener::{Listener, PartnerDiagnosis, PartnerStatus};
 pub use live_status::{LiveStatus, LostCopies, SegmentStatus, SubDeviceStatus, WkcShare};
-pub use obstacles::{obstacles, replaced_reference};
 pub use options::Options;
 pub use pending::Pending;
-pub use register_error::RegisterError;
-pub use registered_area::{EntryPlace, RegisteredArea};
-pub use sent_once::SentOnce;
+pub use services::datagrams::{MAX_DATAGRAMS, RawDatagram};
+pub use services::ethernet::EthernetSubDevice;
 #[cfg(feature = "standby")]
-pub use standby_options::StandbyOptions;
+pub use standby::listener::{Listener, PartnerDiagnosis, PartnerStatus};
+#[cfg(feature = "standby")]
+pub use standby::standby_options::StandbyOptions;
 pub use states::{GroupState, SubDeviceState};
 
 pub use crate::declared::{Address, GroupId, SubDeviceId};
@@ -128,8 +88,8 @@ use crate::segment::member::Phase;
 use crate::segment::{Choices, LinkObservation, Observation, Segment, counts};
 use crate::supervisor::{AcyclicCounters, Bus, Received, Supervisor, UnderWay};
 use crate::time::Instant;
-use loaded::Loaded;
-use memories::Memories;
+use declaration::loaded::Loaded;
+use declaration::memories::Memories;
 
 type StopSlot = Rc<RefCell<Option<Result<(), StopError>>>>;
 

@@ -31,11 +31,14 @@ const STARTS: [(&str, &str); 18] = [
     ("crates/engine/src/mail/relay/gateway_queue.rs", "one procedure per message of a gateway's client"),
     ("crates/engine/src/main_device/activate.rs", "the reconciler of an application"),
     ("crates/engine/src/main_device/idle.rs", "a call of the application: deactivation"),
-    ("crates/engine/src/main_device/follow.rs", "a call of the application: the model shows states of the ACTIVE"),
+    (
+        "crates/engine/src/main_device/standby/follow.rs",
+        "a call of the application: the model shows states of the ACTIVE",
+    ),
     ("crates/engine/src/main_device/handover.rs", "a call of the application: going on with known SubDevices"),
     ("crates/engine/src/main_device/pending.rs", "services that the application calls"),
     ("crates/engine/src/main_device/scanning.rs", "a call of the application: a scan"),
-    ("crates/engine/src/main_device/commands.rs", "reports of commands, which the application switches"),
+    ("crates/engine/src/main_device/services/commands.rs", "reports of commands, which the application switches"),
     ("crates/engine/src/main_device/sampling.rs", "samples that the application orders"),
     ("crates/engine/src/main_device.rs", "the reconciler; a call of the application: a stop"),
 ];

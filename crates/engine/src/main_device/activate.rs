@@ -1,5 +1,13 @@
 //! The last step of a configuration: lays out process data, creates both halves, starts procedures.
 
+pub(super) mod activate_error;
+pub(super) mod lay_out;
+pub(super) mod lrw;
+pub(super) mod obstacles;
+pub(super) mod prepare;
+pub(super) mod repeats;
+pub(super) mod sent_once;
+
 use alloc::boxed::Box;
 use alloc::rc::Rc;
 use alloc::sync::Arc;
@@ -8,16 +16,11 @@ use alloc::vec::Vec;
 use ringcat_wire::address::Position;
 
 use super::MainDevice;
-use super::activate_error::ActivateError;
 use super::active::Active;
-use super::areas::{Areas, Directory};
 use super::declaration::Declaration;
-use super::lay_out::{LaidOut, lay_out};
+use super::declaration::areas::{Areas, Directory};
+use super::declaration::loaded::Loaded;
 use super::live_status::LiveStatus;
-use super::loaded::Loaded;
-use super::obstacles::replaced;
-use super::prepare::{check_clocks, check_domains, match_declaration, members, plan_all, report_oddities, with_domain};
-use super::repeats;
 use crate::board::Board;
 use crate::config::ClockConfig;
 use crate::declared::SubDeviceId;
@@ -34,6 +37,10 @@ use crate::segment::findings::{DeclarationFinding, Oddity};
 use crate::segment::{Cabling, Declared, Found, Observation, SubDevices, stations_by_position};
 use crate::time::Instant;
 use crate::topology::Topology;
+use activate_error::ActivateError;
+use lay_out::{LaidOut, lay_out};
+use obstacles::replaced;
+use prepare::{check_clocks, check_domains, match_declaration, members, plan_all, report_oddities, with_domain};
 
 /// Events of the exchange that may wait to be fetched.
 const CYCLIC_EVENTS: usize = 1024;

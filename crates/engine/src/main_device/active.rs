@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use super::areas::Directory;
+use super::declaration::areas::Directory;
 use super::live_status::LiveStatus;
 use crate::exchange::Exchange;
 

@@ -1,16 +1,27 @@
 //! The declaration of the application: SubDevices, domains, clocks.
 
+pub(super) mod areas;
+pub(super) mod declare;
+pub(super) mod image_memory;
+pub(super) mod loaded;
+pub(super) mod memories;
+pub(super) mod register_error;
+pub(super) mod registered;
+pub(super) mod registered_area;
+pub(super) mod registration;
+pub(super) mod working_counters;
+
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::time::Duration;
 
 use ringcat_wire::address::LogicalAddress;
 
-use super::image_memory::ImageMemory;
-use super::registered_area::RegisteredArea;
 use crate::config::{ClockConfig, Group, SubDeviceConfig};
 use crate::declared::{GroupId, SubDeviceId};
 use crate::layout::LrwPolicy;
+use image_memory::ImageMemory;
+use registered_area::RegisteredArea;
 
 /// Maximum number of cycles of a domain under way at once.
 pub const MAX_UNDER_WAY: u8 = 4;

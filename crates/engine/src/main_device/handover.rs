@@ -8,7 +8,7 @@ use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::al::AlState;
 
 use super::MainDevice;
-use super::activate_error::ActivateError;
+use super::activate::activate_error::ActivateError;
 use crate::info::{PdoSource, SubDeviceInfo};
 use crate::knowledge::{Handover, Knowledge, KnownMailbox, KnownProgress, KnownSubDevice};
 use crate::procedures::resume::{Before, Known, resume};

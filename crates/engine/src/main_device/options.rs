@@ -13,7 +13,7 @@ use crate::role::MainDeviceRole;
 use crate::segment::{ReadPdos, Retries};
 
 #[cfg(feature = "standby")]
-use super::standby_options::StandbyOptions;
+use super::standby::standby_options::StandbyOptions;
 
 /// Configuration of a MainDevice that is needed before the first frame.
 #[derive(Clone, Debug)]

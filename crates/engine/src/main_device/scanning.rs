@@ -4,7 +4,7 @@ use alloc::string::ToString;
 use alloc::vec::Vec;
 
 use super::MainDevice;
-use super::activate_error::ActivateError;
+use super::activate::activate_error::ActivateError;
 use crate::info::{SiiExtent, SubDeviceInfo};
 use crate::procedures::cabling::until_link_returns;
 use crate::procedures::loops::restore;

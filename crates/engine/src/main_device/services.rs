@@ -2,6 +2,14 @@
 //!
 //! SubDevices are named by their [`Address`]: the index in the declaration, or the position on the bus.
 
+pub(super) mod commands;
+pub(super) mod datagrams;
+pub(super) mod ethernet;
+pub(super) mod gateway;
+pub(super) mod mail;
+pub(super) mod messages;
+pub(super) mod tool;
+
 use alloc::vec::Vec;
 use core::future::Future;
 use core::time::Duration;

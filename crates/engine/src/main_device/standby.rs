@@ -1,13 +1,19 @@
 //! Data of one of two MainDevices in a ring: options, what both halves share, and the state of the other MainDevice.
 
+pub(super) mod follow;
+pub(super) mod identity;
+pub(super) mod listen;
+pub(super) mod listener;
+pub(super) mod partner_ethernet;
+pub(super) mod redundancy;
+pub(super) mod standby_options;
+pub(super) mod take_over;
+
 use alloc::sync::Arc;
 
 use ringcat_wire::frame::MacAddress;
 use ringcat_wire::memory_write::MemoryWrite;
 
-use super::identity::Configuration;
-use super::listener::Listener;
-use super::standby_options::StandbyOptions;
 use crate::board::standby::StandbyWords;
 use crate::event::{CyclicEvent, Event};
 use crate::link::LinkSet;
@@ -15,6 +21,9 @@ use crate::ring::Identity;
 use crate::standby::PartnerEndpoint;
 use crate::standby::ethernet::PartnerEthernet;
 use crate::time::Instant;
+use identity::Configuration;
+use listener::Listener;
+use standby_options::StandbyOptions;
 
 /// What a MainDevice has for redundancy.
 #[derive(Debug)]

@@ -8,13 +8,13 @@ use alloc::vec::Vec;
 use ringcat_wire::address::{RegisterAddress, StationAddress};
 
 use super::MainDevice;
-use super::activate_error::ActivateError;
+use super::activate::activate_error::ActivateError;
+use super::activate::prepare::check;
 use super::active::Active;
 use super::declaration::Declaration;
-use super::loaded::{Loaded, closing};
-use super::memories::Memories;
+use super::declaration::loaded::{Loaded, closing};
+use super::declaration::memories::Memories;
 use super::pending::Pending;
-use super::prepare::check;
 use crate::config::{Resolution, data_words, resolve};
 use crate::domain::DomainId;
 use crate::info::SubDeviceInfo;

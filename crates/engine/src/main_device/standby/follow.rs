@@ -7,12 +7,12 @@
 use alloc::rc::Rc;
 use alloc::vec::Vec;
 
-use super::MainDevice;
-use super::activate_error::ActivateError;
-use super::active::Active;
-use super::declaration::Declaration;
 use crate::info::SubDeviceInfo;
 use crate::knowledge::Knowledge;
+use crate::main_device::MainDevice;
+use crate::main_device::activate::activate_error::ActivateError;
+use crate::main_device::active::Active;
+use crate::main_device::declaration::Declaration;
 use crate::procedures::mirror::mirror;
 use crate::role::Function;
 use crate::segment::clocks::ClockObservation;
@@ -62,7 +62,7 @@ impl MainDevice {
     }
 
     /// From now on the model shows the states reported by the ACTIVE.
-    pub(super) fn begin_mirror(&mut self) {
+    pub(in crate::main_device) fn begin_mirror(&mut self) {
         let (bus, segment) = (self.supervisor.bus(), self.segment.clone());
         self.supervisor.spawn(mirror(bus, segment, self.requests.clone()));
     }

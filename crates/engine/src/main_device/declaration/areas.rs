@@ -6,7 +6,6 @@ use alloc::vec::Vec;
 use core::fmt;
 use core::ops::Range;
 
-use super::sent_once::SentOnce;
 use super::working_counters::expected_as_igh;
 use crate::config::{PdoEntry, PdoMapping, SubDeviceConfig};
 use crate::declared::SubDeviceId;
@@ -14,6 +13,7 @@ use crate::domain::DomainId;
 use crate::exchange::Entry;
 use crate::info::{Direction, SubDeviceInfo};
 use crate::layout::{Layout, PlacedArea};
+use crate::main_device::activate::sent_once::SentOnce;
 use crate::order::InOrder;
 use crate::plan::{MappedEntry, SubDevicePlan};
 use crate::segment::setup::{SetupError, declared_areas, planned_areas};
@@ -82,7 +82,7 @@ impl fmt::Display for ObjectOf {
 }
 
 impl Directory {
-    pub(super) fn new(plans: &[Areas], layout: &Layout) -> Directory {
+    pub(in crate::main_device) fn new(plans: &[Areas], layout: &Layout) -> Directory {
         let subdevices = plans.iter().enumerate().map(|(index, areas)| areas.directory(index, layout)).collect();
         let mut contributions = vec![0; plans.len()];
         let frames = layout.domains.iter().flat_map(|domain| &domain.frames);
@@ -97,13 +97,13 @@ impl Directory {
     }
 
     /// `repeats`: by SubDevice, what may be sent again, or why not everything may.
-    pub(super) fn with_sent_once<T>(self, repeats: &[Result<T, SentOnce>]) -> Directory {
+    pub(in crate::main_device) fn with_sent_once<T>(self, repeats: &[Result<T, SentOnce>]) -> Directory {
         let sent_once = repeats.iter().map(|repeat| repeat.as_ref().err().copied()).collect();
         Directory { sent_once, ..self }
     }
 
     /// The SubDevices of which not all process data is sent again when a frame is lost, in domains that do that
-    /// ([`DomainConfig::sends_again`](super::DomainConfig::sends_again)), and why.
+    /// ([`DomainConfig::sends_again`](super::super::DomainConfig::sends_again)), and why.
     pub fn sent_once(&self) -> impl Iterator<Item = (SubDeviceId, SentOnce)> {
         self.sent_once.iter().enumerate().filter_map(|(subdevice, reason)| Some((SubDeviceId(subdevice), (*reason)?)))
     }
@@ -156,7 +156,8 @@ impl Directory {
         self.contributions.get(subdevice.0).copied().unwrap_or(0)
     }
 
-    /// The working counter of a domain as IgH's interface expects it ([`super::Declaration::expected_wkc_as_igh`]);
+    /// The working counter of a domain as IgH's interface expects it
+    /// ([`expected_wkc_as_igh`](super::super::Declaration::expected_wkc_as_igh));
     /// [`crate::domain::DomainStatus::expected`] is that of the datagrams in use.
     pub fn expected_wkc_as_igh(&self, domain: DomainId) -> u32 {
         let areas = self.subdevices.iter().flatten().filter(|area| area.domain == domain);
@@ -180,14 +181,14 @@ impl Directory {
 
 /// Process data of a declared SubDevice: planned from its SII, or from the declaration if it is absent or its SII
 /// cannot be used.
-pub(super) enum Areas {
+pub(in crate::main_device) enum Areas {
     /// Planned; `None` if no process data is exchanged in its target state.
     Planned(Option<SubDevicePlan>),
     Declared(Declared),
 }
 
 /// Data fixed by the declaration alone.
-pub(super) struct Declared {
+pub(in crate::main_device) struct Declared {
     areas: Vec<(u8, Direction, u16)>,
     config: Box<SubDeviceConfig>,
     /// It supports LRW.
@@ -210,7 +211,7 @@ impl Declared {
 }
 
 impl Areas {
-    pub(super) fn list(&self) -> Vec<(u8, Direction, u16)> {
+    pub(in crate::main_device) fn list(&self) -> Vec<(u8, Direction, u16)> {
         match self {
             Areas::Planned(plan) => plan.as_ref().map(planned_areas).unwrap_or_default(),
             Areas::Declared(declared) => declared.areas.clone(),
@@ -218,21 +219,21 @@ impl Areas {
     }
 
     /// Why a present SubDevice is not planned.
-    pub(super) fn unfit(&self) -> Option<&SetupError> {
+    pub(in crate::main_device) fn unfit(&self) -> Option<&SetupError> {
         match self {
             Areas::Planned(_) => None,
             Areas::Declared(declared) => declared.unfit.as_ref(),
         }
     }
 
-    pub(super) fn lrw(&self) -> bool {
+    pub(in crate::main_device) fn lrw(&self) -> bool {
         match self {
             Areas::Planned(plan) => plan.as_ref().is_none_or(|plan| plan.lrw_supported),
             Areas::Declared(declared) => declared.lrw,
         }
     }
 
-    pub(super) fn directory(&self, index: usize, layout: &Layout) -> Vec<AreaEntries> {
+    pub(in crate::main_device) fn directory(&self, index: usize, layout: &Layout) -> Vec<AreaEntries> {
         let mut found = Vec::new();
         let mut places: Vec<(DomainId, PlacedArea)> = layout.areas_of(index).collect();
         // In the order of the SyncManagers; the places of one in the order of the domains.
@@ -252,12 +253,12 @@ impl Areas {
     }
 
     /// Entries of an area in order, gaps included.
-    pub(super) fn mapped(&self, sync_manager: u8) -> Vec<MappedEntry> {
+    pub(in crate::main_device) fn mapped(&self, sync_manager: u8) -> Vec<MappedEntry> {
         self.pdos(sync_manager).into_iter().flatten().collect()
     }
 
     /// Entries of an area by PDO, gaps included.
-    pub(super) fn pdos(&self, sync_manager: u8) -> Vec<Vec<MappedEntry>> {
+    pub(in crate::main_device) fn pdos(&self, sync_manager: u8) -> Vec<Vec<MappedEntry>> {
         match self {
             Areas::Planned(plan) => {
                 let areas = plan.iter().flat_map(|plan| &plan.process_data);

@@ -10,8 +10,6 @@ use ringcat_wire::al::AlState;
 use ringcat_wire::frame::MacAddress;
 use ringcat_wire::memory_write::{MemoryWrite, WriteKind};
 
-use super::MainDevice;
-use super::standby::Collision;
 use crate::board::live::{Life, Presence};
 use crate::board::standby::Takeover;
 use crate::declared::{Address, SubDeviceId};
@@ -19,6 +17,8 @@ use crate::event::{Event, StandbyEvent};
 use crate::knowledge::{Handover, KnownMailbox};
 use crate::link::Link;
 use crate::mail::InUse;
+use crate::main_device::MainDevice;
+use crate::main_device::standby::Collision;
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::shared_segment::Beside;
 use crate::role::{MainDeviceRole, Partner, RoleCause, RoleRequest};
@@ -37,7 +37,7 @@ const BOOT_EACH: Duration = Duration::from_millis(10);
 impl MainDevice {
     /// Follows a change of the role, and publishes what the other MainDevice needs. Without an application, requested
     /// roles take effect here.
-    pub(super) fn follow_role(&mut self, now: Instant) {
+    pub(in crate::main_device) fn follow_role(&mut self, now: Instant) {
         if self.standby.is_none() {
             return;
         }

@@ -4,10 +4,10 @@ use core::future::Future;
 
 use ringcat_wire::al::AlState;
 
-use super::MainDevice;
-use super::pending::Pending;
 use crate::declared::{Address, SubDeviceId};
 use crate::mail::{EmergencyRing, Mailbox};
+use crate::main_device::MainDevice;
+use crate::main_device::pending::Pending;
 use crate::procedures::configure::ConfigureError;
 use crate::procedures::request_state::request_state;
 use crate::procedures::undeclared::request;
@@ -121,7 +121,7 @@ impl MainDevice {
     }
 
     /// A mailbox that is not in use yet, with the ring of its SubDevice.
-    pub(super) fn new_mailbox(&mut self, subdevice: impl Into<Address>) -> Mailbox {
+    pub(in crate::main_device) fn new_mailbox(&mut self, subdevice: impl Into<Address>) -> Mailbox {
         let subdevice = subdevice.into();
         let mailbox = Mailbox::new(&self.supervisor.bus(), subdevice);
         mailbox.keep_emergencies_in(self.emergencies.borrow_mut().of(subdevice));

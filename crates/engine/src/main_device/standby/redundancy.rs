@@ -6,11 +6,7 @@ use core::time::Duration;
 use ringcat_wire::al::AlState;
 use ringcat_wire::frame::MAX_FRAME;
 
-use super::MainDevice;
-use super::declaration::Declaration;
 use super::identity::Configuration;
-use super::prepare::watchdog_of;
-use super::standby::Marks;
 use crate::board::standby::KNOWLEDGE_ROOM;
 use crate::declared::SubDeviceId;
 use crate::direction::Direction;
@@ -19,6 +15,10 @@ use crate::exchange::{Exchange, StandbySetup};
 use crate::knowledge::Knowledge;
 use crate::layout::{Layout, LayoutError, LrwPolicy, PlannedMasterFrames};
 use crate::link::LinkSet;
+use crate::main_device::MainDevice;
+use crate::main_device::activate::prepare::watchdog_of;
+use crate::main_device::declaration::Declaration;
+use crate::main_device::standby::Marks;
 use crate::role::{MainDeviceRole, RoleControl};
 use crate::segment::SubDevices;
 use crate::segment::member::MemberView;
@@ -41,12 +41,12 @@ impl MainDevice {
     }
 
     /// LRW is not allowed: the INACTIVE takes outputs from frames that have passed SubDevices (protocol REQ047).
-    pub(super) fn is_lrw_refused(&self, lrw: LrwPolicy) -> bool {
+    pub(in crate::main_device) fn is_lrw_refused(&self, lrw: LrwPolicy) -> bool {
         self.standby.is_some() && lrw == LrwPolicy::PerSubDevice
     }
 
     /// Sets up the exchange for a ring of two MainDevices.
-    pub(super) fn set_up_standby(
+    pub(in crate::main_device) fn set_up_standby(
         &mut self,
         exchange: &mut Exchange,
         (declaration, layout, session): (&Declaration, &Layout, u32),
@@ -120,7 +120,7 @@ impl MainDevice {
     }
 
     /// Publishes the knowledge of the segment for the other MainDevice, if it is time.
-    pub(super) fn publish_knowledge(&mut self, now: Instant) {
+    pub(in crate::main_device) fn publish_knowledge(&mut self, now: Instant) {
         let Some(standby) = &self.standby else { return };
         let (earliest, latest) = standby.publish_at;
         if now < earliest || self.role() != MainDeviceRole::Active || self.active().is_none() {

@@ -6,10 +6,10 @@ use alloc::vec::Vec;
 use ringcat_wire::address::Position;
 use ringcat_wire::sii::MailboxProtocols;
 
-use super::MainDevice;
 use crate::declared::{Address, SubDeviceId};
 use crate::info::SubDeviceInfo;
 use crate::mail::eoe::EthernetPort;
+use crate::main_device::MainDevice;
 use crate::role::Function;
 
 /// A SubDevice that supports Ethernet frames.

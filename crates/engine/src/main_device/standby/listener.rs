@@ -48,7 +48,7 @@ pub struct Listener {
 }
 
 impl Listener {
-    pub(super) fn new(words: Arc<StandbyWords>) -> Listener {
+    pub(in crate::main_device) fn new(words: Arc<StandbyWords>) -> Listener {
         let mut listening = Following::new(Lengths::default(), words.clone());
         listening.answer.not_ready = NotReady::NO_APPLICATION;
         Listener { listening, words }
@@ -77,7 +77,7 @@ impl Listener {
 }
 
 /// Knowledge of an ACTIVE; `None` before all of it has been written.
-pub(super) fn known(sheet: &Sheet) -> Option<Knowledge> {
+pub(in crate::main_device) fn known(sheet: &Sheet) -> Option<Knowledge> {
     let (_, bytes) = sheet.copy()?;
     Knowledge::from_bytes(&bytes).ok()
 }

@@ -5,14 +5,18 @@ use alloc::vec::Vec;
 use ringcat_wire::command::Command;
 
 use super::activate_error::ActivateError;
-use super::declaration::ExplicitLrw;
 use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
 use crate::layout::{DomainSpec, Layout, LrwPolicy, Rules};
 use crate::link::LinkSet;
+use crate::main_device::declaration::ExplicitLrw;
 
 /// The policy together with datagrams of a configuration file.
-pub(super) fn policy(policy: LrwPolicy, named: &[ExplicitLrw], links: LinkSet) -> Result<LrwPolicy, ActivateError> {
+pub(in crate::main_device) fn policy(
+    policy: LrwPolicy,
+    named: &[ExplicitLrw],
+    links: LinkSet,
+) -> Result<LrwPolicy, ActivateError> {
     if links == LinkSet::Single || named.is_empty() {
         return Ok(policy);
     }
@@ -23,7 +27,11 @@ pub(super) fn policy(policy: LrwPolicy, named: &[ExplicitLrw], links: LinkSet) -
 }
 
 /// Refuses LRW over several SubDevices on two links, and names the datagram.
-pub(super) fn check_lrw(lrw: LrwPolicy, specs: &[DomainSpec], links: LinkSet) -> Result<(), ActivateError> {
+pub(in crate::main_device) fn check_lrw(
+    lrw: LrwPolicy,
+    specs: &[DomainSpec],
+    links: LinkSet,
+) -> Result<(), ActivateError> {
     if lrw != LrwPolicy::Explicit || links == LinkSet::Single {
         return Ok(());
     }

@@ -12,16 +12,16 @@ use ringcat_wire::datagram::MAX_DATA;
 use ringcat_wire::register::{WatchdogDivider, WatchdogTime};
 
 use super::activate_error::ActivateError;
-use super::areas::{Areas, Declared};
-use super::declaration::{Declaration, DomainConfig, MAX_UNDER_WAY, Required};
-use super::registered;
-use super::registered_area::RegisteredArea;
 use crate::config::{ConfigError, Resolution, SubDeviceConfig, can_be_head, groups, resolve};
 use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
 use crate::info::SubDeviceInfo;
 use crate::layout::{AreaSpec, DomainSpec, ImageOrder, Layout, LrwPolicy, Witness};
 use crate::link::LinkSet;
+use crate::main_device::declaration::areas::{Areas, Declared};
+use crate::main_device::declaration::registered;
+use crate::main_device::declaration::registered_area::RegisteredArea;
+use crate::main_device::declaration::{Declaration, DomainConfig, MAX_UNDER_WAY, Required};
 use crate::plan::{PlanError, PlanFault, PlanProblem, SubDevicePlan, plan};
 use crate::procedures::request_state::exchanges;
 use crate::procedures::scan::station_at;
@@ -38,7 +38,7 @@ const SUPERVISION_PERIOD: Duration = Duration::from_millis(10);
 type Matched = (Vec<Option<Rc<SubDeviceInfo>>>, Vec<SubDevice>);
 
 /// Matches SubDevices with the declaration.
-pub(super) fn match_declaration(
+pub(in crate::main_device) fn match_declaration(
     segment: &SharedSegment,
     declaration: &Declaration,
     scan: &Found,
@@ -75,7 +75,7 @@ pub(super) fn match_declaration(
 }
 
 /// SYNC signals need a clock, and clocks that are synchronized. A SubDevice without a clock may fail alone.
-pub(super) fn check_clocks(
+pub(in crate::main_device) fn check_clocks(
     declaration: &Declaration,
     found: &[Option<Rc<SubDeviceInfo>>],
 ) -> Result<(), ActivateError> {
@@ -87,7 +87,7 @@ pub(super) fn check_clocks(
 }
 
 /// Why a SubDevice cannot have the SYNC signals that are declared for it.
-pub(super) fn no_clock(
+pub(in crate::main_device) fn no_clock(
     declaration: &Declaration,
     found: &[Option<Rc<SubDeviceInfo>>],
     subdevice: usize,
@@ -108,7 +108,7 @@ fn fails_alone(declaration: &Declaration) -> bool {
     declaration.required == Required::Nothing
 }
 
-pub(super) fn plan_all(
+pub(in crate::main_device) fn plan_all(
     declaration: &Declaration,
     found: &[Option<Rc<SubDeviceInfo>>],
 ) -> Result<Vec<Areas>, ActivateError> {
@@ -177,7 +177,11 @@ fn misplaced(declaration: &Declaration, subdevice: SubDeviceId, plan: &SubDevice
 
 /// How each SubDevice shows whether its inputs were processed. For an absent SubDevice it is unknown whether it has a
 /// free FMMU.
-pub(super) fn witnesses(plans: &[Areas], found: &[Option<Rc<SubDeviceInfo>>], specs: &[DomainSpec]) -> Vec<Witness> {
+pub(in crate::main_device) fn witnesses(
+    plans: &[Areas],
+    found: &[Option<Rc<SubDeviceInfo>>],
+    specs: &[DomainSpec],
+) -> Vec<Witness> {
     // Further places of an area need FMMUs, too.
     let mut further = vec![0; plans.len()];
     let mut seen = BTreeSet::new();
@@ -199,7 +203,7 @@ pub(super) fn witnesses(plans: &[Areas], found: &[Option<Rc<SubDeviceInfo>>], sp
 }
 
 /// Checks of the declaration that need no SubDevice.
-pub(super) fn check(declaration: &Declaration) -> Result<(), ActivateError> {
+pub(in crate::main_device) fn check(declaration: &Declaration) -> Result<(), ActivateError> {
     let boot = declaration.subdevices.iter().position(|config| config.target == AlState::Boot);
     if let Some(subdevice) = boot {
         return Err(ActivateError::Target { subdevice: SubDeviceId(subdevice), target: AlState::Boot });
@@ -240,7 +244,7 @@ fn check_sync_cycles(declaration: &Declaration, period: Duration) -> Result<(), 
 
 /// Process data without any domain would never be exchanged. Without a required SubDevice this is no obstacle: its
 /// outputs stay where its watchdog has them.
-pub(super) fn check_domains(declaration: &Declaration, plans: &[Areas]) -> Result<(), ActivateError> {
+pub(in crate::main_device) fn check_domains(declaration: &Declaration, plans: &[Areas]) -> Result<(), ActivateError> {
     if fails_alone(declaration) {
         return Ok(());
     }
@@ -253,7 +257,7 @@ pub(super) fn check_domains(declaration: &Declaration, plans: &[Areas]) -> Resul
     }
 }
 
-pub(super) fn domain_specs(
+pub(in crate::main_device) fn domain_specs(
     declaration: &Declaration,
     plans: &[Areas],
     lrw: LrwPolicy,
@@ -309,7 +313,7 @@ pub(super) fn domain_specs(
 }
 
 /// An application without domains still has one for the supervision datagram.
-pub(super) fn with_domain(mut declaration: Declaration) -> Declaration {
+pub(in crate::main_device) fn with_domain(mut declaration: Declaration) -> Declaration {
     if declaration.domains.is_empty() {
         declaration.domains.push(DomainConfig::new(SUPERVISION_PERIOD, Vec::new()));
     }
@@ -317,7 +321,7 @@ pub(super) fn with_domain(mut declaration: Declaration) -> Declaration {
 }
 
 /// Reports rules that SubDevices cannot follow, and optional SubDevices for which the process image has no place.
-pub(super) fn report_oddities(segment: &SharedSegment, subdevices: &SubDevices, layout: &Layout) {
+pub(in crate::main_device) fn report_oddities(segment: &SharedSegment, subdevices: &SubDevices, layout: &Layout) {
     let report = |subdevice: usize, oddity: Oddity| {
         segment.observe(Observation::Compared(DeclarationFinding::Oddity(SubDeviceId(subdevice), oddity)));
     };
@@ -336,7 +340,7 @@ pub(super) fn report_oddities(segment: &SharedSegment, subdevices: &SubDevices, 
 }
 
 /// Time of a SubDevice's watchdog for process data, as declared; `None` if it is off.
-pub(super) fn watchdog_of(member: &MemberView<'_>) -> Option<Duration> {
+pub(in crate::main_device) fn watchdog_of(member: &MemberView<'_>) -> Option<Duration> {
     let divider = member.config.watchdog_divider.map_or(WatchdogDivider::default(), WatchdogDivider);
     let intervals = member.config.watchdog_intervals.map_or(WatchdogTime::default(), WatchdogTime);
     Some(Duration::from_nanos(intervals.duration_ns(divider)?))
@@ -354,7 +358,7 @@ fn beyond_watchdog(subdevice: usize, member: &MemberView<'_>, layout: &Layout) -
     periods.max().filter(|period| !period.is_zero() && *period >= watchdog).map(|period| (period, watchdog))
 }
 
-pub(super) fn members(
+pub(in crate::main_device) fn members(
     declaration: Declaration,
     found: Vec<Option<Rc<SubDeviceInfo>>>,
     plans: &[Areas],

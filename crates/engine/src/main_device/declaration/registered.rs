@@ -1,14 +1,14 @@
 //! Domains of registered process data at activation: the areas with their places, compared with the plans.
 
-use super::activate_error::ActivateError;
 use super::areas::Areas;
 use super::registered_area::RegisteredArea;
 use crate::domain::DomainId;
 use crate::layout::{AreaSpec, DomainSpec, FixedImage, ImageOrder};
+use crate::main_device::activate::activate_error::ActivateError;
 
 /// Fills in the areas of a domain. The places of SubDevices that exchange no process data in their target state stay
 /// in the image, and no frame holds them.
-pub(super) fn fill(
+pub(in crate::main_device) fn fill(
     spec: &mut DomainSpec,
     domain: DomainId,
     registered: &[RegisteredArea],

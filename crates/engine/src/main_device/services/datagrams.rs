@@ -10,11 +10,11 @@ use ringcat_wire::address::{LogicalAddress, Position, StationAddress, Wkc};
 use ringcat_wire::command::Command;
 use ringcat_wire::datagram::Target;
 
-use super::MainDevice;
-use super::pending::Pending;
 use crate::declared::SubDeviceId;
 use crate::layout::Layout;
 use crate::link::LinkSet;
+use crate::main_device::MainDevice;
+use crate::main_device::pending::Pending;
 use crate::procedures::junction::{UnderWay, ordering};
 use crate::procedures::services::ServiceError;
 use crate::procedures::shared_segment::SharedSegment;

@@ -3,11 +3,11 @@
 use alloc::vec;
 use core::time::Duration;
 
-use super::declaration::{Declaration, DomainConfig, DomainMember, Required};
 use crate::config::{ClockConfig, SubDeviceConfig};
 use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
 use crate::layout::LrwPolicy;
+use crate::main_device::declaration::{Declaration, DomainConfig, DomainMember, Required};
 
 impl Declaration {
     /// A declaration with one domain of this period, [`DomainId`] 0, and no SubDevices yet.

@@ -24,12 +24,12 @@ impl ImageMemory {
     }
 
     /// Whether no copy of the declaration has the memory, too.
-    pub(super) fn is_only(&mut self) -> bool {
+    pub(in crate::main_device) fn is_only(&mut self) -> bool {
         Arc::get_mut(&mut self.0).is_some()
     }
 
     /// The memory; `None` if a copy of the declaration has it.
-    pub(super) fn into_inner(self) -> Option<&'static mut [u8]> {
+    pub(in crate::main_device) fn into_inner(self) -> Option<&'static mut [u8]> {
         Arc::into_inner(self.0).map(|given| given.0)
     }
 }

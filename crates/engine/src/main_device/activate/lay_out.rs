@@ -4,15 +4,15 @@ use alloc::rc::Rc;
 use alloc::vec::Vec;
 
 use super::activate_error::ActivateError;
-use super::areas::Areas;
-use super::declaration::Declaration;
 use super::lrw::{self, check_lrw};
 use super::prepare::{domain_specs, witnesses};
 use crate::info::SubDeviceInfo;
 use crate::layout::{DomainSpec, Layout, LrwPolicy, Rules};
+use crate::main_device::declaration::Declaration;
+use crate::main_device::declaration::areas::Areas;
 
 /// The domains of a declaration on a segment.
-pub(super) struct LaidOut {
+pub(in crate::main_device) struct LaidOut {
     /// Where LRW is used.
     #[cfg(feature = "standby")]
     pub lrw: LrwPolicy,
@@ -22,7 +22,7 @@ pub(super) struct LaidOut {
 
 /// The domains, and the places of their process data. The declaration replaces the policy of LRW and the witnesses in
 /// `rules`.
-pub(super) fn lay_out(
+pub(in crate::main_device) fn lay_out(
     declaration: &Declaration,
     plans: &[Areas],
     found: &[Option<Rc<SubDeviceInfo>>],

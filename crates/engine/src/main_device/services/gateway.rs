@@ -6,9 +6,9 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::mailbox::{ErrorReply, Message, Protocol};
 use ringcat_wire::sii::MailboxProtocols;
 
-use super::MainDevice;
 use crate::mail::Mailbox;
 use crate::mail::relay::{GatewayQueue, Recipient, RelayCounters, Relayed};
+use crate::main_device::MainDevice;
 use crate::procedures::own_objects::Seen;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::role::Function;

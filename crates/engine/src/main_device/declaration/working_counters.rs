@@ -10,7 +10,7 @@ use crate::info::Direction;
 /// Expected working counter of an image whose areas follow each other: the image is cut before an area that does not
 /// fit a datagram; an LRW where a piece has both directions, otherwise an LWR or an LRD. Each counts a SubDevice once
 /// per direction: LRW 2 for outputs and 1 for inputs, LWR and LRD 1 (protocol 1.4).
-pub(super) fn expected_as_igh(areas: impl Iterator<Item = (SubDeviceId, Direction, u16)>) -> u32 {
+pub(in crate::main_device) fn expected_as_igh(areas: impl Iterator<Item = (SubDeviceId, Direction, u16)>) -> u32 {
     let (mut sum, mut bytes, mut piece) = (0, 0, Piece::default());
     for (subdevice, direction, length) in areas.filter(|(.., length)| *length > 0) {
         if bytes + usize::from(length) > MAX_DATA {

@@ -6,11 +6,11 @@ use alloc::vec::Vec;
 use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::PortKind;
 
-use super::activate_error::ActivateError;
-use super::declaration::Declaration;
 use crate::declared::SubDeviceId;
 use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionError, JunctionMode, START_PORT};
+use crate::main_device::activate::activate_error::ActivateError;
+use crate::main_device::declaration::Declaration;
 use crate::procedures::scan::{Scan, cabling_findings, node_status};
 use crate::procedures::shared_segment::SharedSegment;
 use crate::segment::findings::{DeclarationFinding, Oddity};
@@ -20,14 +20,14 @@ use crate::topology::{Closing, NodeStatus, PortOf, Topology};
 
 /// A loaded declaration that is not applied yet.
 #[derive(Clone, Debug)]
-pub(super) struct Loaded {
+pub(in crate::main_device) struct Loaded {
     pub declaration: Declaration,
     pub connections: Vec<JunctionConnection>,
 }
 
 impl Loaded {
     /// The topology with the declared local rings, if any; otherwise that of the scan.
-    pub(super) fn topology(
+    pub(in crate::main_device) fn topology(
         &self,
         (bus, segment): (&Bus, &SharedSegment),
         mode: JunctionMode,
@@ -61,7 +61,7 @@ impl Loaded {
 
     /// Both ends of the closing cables of the declared rings, if any, at the present positions of their SubDevices;
     /// otherwise those of the topology.
-    pub(super) fn closings(
+    pub(in crate::main_device) fn closings(
         &self,
         topology: &Topology,
         subdevices: &SubDevices,
@@ -79,7 +79,10 @@ impl Loaded {
 }
 
 /// The mode strict needs a connection.
-pub(super) fn check_connections(mode: JunctionMode, connections: &[JunctionConnection]) -> Result<(), ActivateError> {
+pub(in crate::main_device) fn check_connections(
+    mode: JunctionMode,
+    connections: &[JunctionConnection],
+) -> Result<(), ActivateError> {
     match mode {
         JunctionMode::Strict if connections.is_empty() => Err(ActivateError::Junction(JunctionError::NoConnection)),
         JunctionMode::Disabled | JunctionMode::Automatic | JunctionMode::Strict => Ok(()),
@@ -87,7 +90,7 @@ pub(super) fn check_connections(mode: JunctionMode, connections: &[JunctionConne
 }
 
 /// The place of a declared connection in the segment; otherwise the optional SubDevice of it that does not answer.
-pub(super) fn closing(
+pub(in crate::main_device) fn closing(
     connection: &JunctionConnection,
     found: &[Option<Rc<SubDeviceInfo>>],
 ) -> Result<Result<Closing, SubDeviceId>, JunctionError> {

@@ -5,9 +5,9 @@ use alloc::vec::Vec;
 use ringcat_wire::al::AlState;
 use ringcat_wire::frame::{ETHERNET_HEADER_LEN, ETHERTYPE, ETHERTYPE_VLAN, MAX_FRAME};
 
-use super::MainDevice;
-use super::pending::Pending;
 use crate::declared::Address;
+use crate::main_device::MainDevice;
+use crate::main_device::pending::Pending;
 use crate::procedures::services::ServiceError;
 use crate::procedures::services::eeprom_owner::{EepromAssignment, EepromOwnership, owner, set_owner};
 use crate::procedures::services::forced_state::{Acknowledge, AlRegisters, force};

@@ -5,11 +5,11 @@
 
 use alloc::vec::Vec;
 
-use super::activate_error::ActivateError;
-use super::declaration::{Declaration, DomainConfig};
 use super::image_memory::ImageMemory;
 use crate::domain::DomainId;
 use crate::layout::Layout;
+use crate::main_device::activate::activate_error::ActivateError;
+use crate::main_device::declaration::{Declaration, DomainConfig};
 
 impl Declaration {
     /// Puts the image of a domain into memory of the application, which outlives the MainDevice: leaked, static, or
@@ -37,7 +37,7 @@ impl Declaration {
 
 /// Memory of each domain of a loaded declaration.
 #[derive(Debug, Default)]
-pub(super) struct Memories(pub Vec<Option<&'static mut [u8]>>);
+pub(in crate::main_device) struct Memories(pub Vec<Option<&'static mut [u8]>>);
 
 impl Memories {
     /// Takes the memory out of a declaration.

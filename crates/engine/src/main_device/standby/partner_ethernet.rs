@@ -4,8 +4,8 @@ use core::time::Duration;
 
 use ringcat_wire::master_frame::is_master_frame;
 
-use super::MainDevice;
 use crate::link::{Link, LinkSet};
+use crate::main_device::MainDevice;
 use crate::ring::Class;
 use crate::ring::identity::{Classified, class_of};
 use crate::role::MainDeviceRole;
@@ -15,7 +15,7 @@ use crate::time::Instant;
 
 impl MainDevice {
     /// The endpoint of the Ethernet to the other MainDevice, for any thread. `None` without
-    /// [`StandbyOptions::max_acyclic`](super::StandbyOptions::max_acyclic), and after the first call.
+    /// [`StandbyOptions::max_acyclic`](super::super::StandbyOptions::max_acyclic), and after the first call.
     pub fn partner_endpoint(&mut self) -> Option<PartnerEndpoint> {
         self.standby.as_mut()?.endpoint.take()
     }
@@ -26,12 +26,12 @@ impl MainDevice {
         self.take_ethernet(bytes, now);
     }
 
-    pub(super) fn has_ethernet(&self) -> bool {
+    pub(in crate::main_device) fn has_ethernet(&self) -> bool {
         self.standby.as_ref().is_some_and(|standby| standby.ethernet.is_some())
     }
 
     /// Takes a received frame, if it is an acyclic master frame; false if it is none of this MainDevice.
-    pub(super) fn take_ethernet(&mut self, bytes: &[u8], now: Instant) -> bool {
+    pub(in crate::main_device) fn take_ethernet(&mut self, bytes: &[u8], now: Instant) -> bool {
         let Some(ethernet) = self.standby.as_mut().and_then(|standby| standby.ethernet.as_mut()) else { return false };
         if !is_acyclic_master_frame(bytes) {
             return false;
@@ -51,7 +51,7 @@ impl MainDevice {
     }
 
     /// Takes and fills an acyclic master frame of the ACTIVE before it is forwarded.
-    pub(super) fn fill_ethernet(&mut self, frame: &mut [u8], now: Instant) {
+    pub(in crate::main_device) fn fill_ethernet(&mut self, frame: &mut [u8], now: Instant) {
         if let Some(ethernet) = self.standby.as_mut().and_then(|standby| standby.ethernet.as_mut())
             && is_acyclic_master_frame(frame)
         {
@@ -60,14 +60,14 @@ impl MainDevice {
     }
 
     /// Sets the period of the cycles, which is that of the master frames.
-    pub(super) fn set_ethernet_period(&mut self, period: Duration) {
+    pub(in crate::main_device) fn set_ethernet_period(&mut self, period: Duration) {
         if let Some(ethernet) = self.standby.as_mut().and_then(|standby| standby.ethernet.as_mut()) {
             ethernet.set_period(period);
         }
     }
 
     /// Follows the role, and determines when master frames are due.
-    pub(super) fn poll_ethernet(&mut self, now: Instant) {
+    pub(in crate::main_device) fn poll_ethernet(&mut self, now: Instant) {
         let is_active = self.role() == MainDeviceRole::Active;
         let Some(ethernet) = self.standby.as_mut().and_then(|standby| standby.ethernet.as_mut()) else { return };
         let EthernetDue { at, is_now } = ethernet.poll(is_active, now);
@@ -75,7 +75,7 @@ impl MainDevice {
     }
 
     /// Sends datagrams of procedures and master frames.
-    pub(super) fn transmit_with_ethernet(
+    pub(in crate::main_device) fn transmit_with_ethernet(
         &mut self,
         now: Instant,
         budget: usize,

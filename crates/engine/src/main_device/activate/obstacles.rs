@@ -9,9 +9,7 @@ use alloc::vec::Vec;
 use ringcat_wire::address::Position;
 
 use super::activate_error::ActivateError;
-use super::declaration::Declaration;
 use super::lay_out::{LaidOut, lay_out};
-use super::loaded::{check_connections, closing};
 use super::prepare::{check, check_domains, no_clock, plan_all, with_domain};
 use crate::config::{ReferenceClock, Resolution, resolve};
 use crate::declared::SubDeviceId;
@@ -19,13 +17,15 @@ use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionMode};
 use crate::layout::Rules;
 use crate::link::LinkSet;
+use crate::main_device::declaration::Declaration;
+use crate::main_device::declaration::loaded::{check_connections, closing};
 use crate::segment::setup::Setup;
 
-/// Everything with which [`MainDevice::activate`](super::MainDevice::activate) would refuse a declaration on the
+/// Everything with which [`MainDevice::activate`](super::super::MainDevice::activate) would refuse a declaration on the
 /// SubDevices of a scan, and SYNC signals that only prevent OP of their own SubDevice. Not contained are missing
 /// SubDevices and SubDevices of another type ([`resolve`]), process data that a SubDevice cannot have
 /// ([`plan`](crate::plan)), closing cables that are not there, which only a test on the bus shows
-/// ([`MainDevice::start_connection_check`](super::MainDevice::start_connection_check)), and what depends on the
+/// ([`MainDevice::start_connection_check`](super::super::MainDevice::start_connection_check)), and what depends on the
 /// options of a MainDevice: memory for images, fewer datagrams per frame, the refusals beside a standby.
 pub fn obstacles(
     declaration: &Declaration,
@@ -71,7 +71,7 @@ pub fn replaced_reference(
 }
 
 /// As [`replaced_reference`], with the SubDevices by declaration.
-pub(super) fn replaced<'a>(
+pub(in crate::main_device) fn replaced<'a>(
     declaration: &Declaration,
     of_declaration: &[Option<Rc<SubDeviceInfo>>],
     mut found: impl Iterator<Item = &'a SubDeviceInfo>,

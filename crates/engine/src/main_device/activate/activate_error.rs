@@ -7,13 +7,13 @@ use core::time::Duration;
 use ringcat_wire::address::LogicalAddress;
 use ringcat_wire::al::AlState;
 
-use super::declaration::{ExplicitLrw, MAX_UNDER_WAY};
 use crate::config::ConfigError;
 use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
 use crate::info::Direction;
 use crate::junction::JunctionError;
 use crate::layout::LayoutError;
+use crate::main_device::declaration::{ExplicitLrw, MAX_UNDER_WAY};
 use crate::role::NotPermitted;
 use crate::segment::setup::SetupError;
 

@@ -7,7 +7,6 @@
 use alloc::vec::Vec;
 
 use super::areas::{Areas, Declared};
-use super::declaration::{Declaration, DomainConfig};
 use super::register_error::RegisterError;
 use super::registered_area::{EntryPlace, RegisteredArea};
 use super::working_counters::expected_as_igh;
@@ -16,6 +15,7 @@ use crate::declared::SubDeviceId;
 use crate::domain::DomainId;
 use crate::exchange::Entry;
 use crate::info::SubDeviceInfo;
+use crate::main_device::declaration::{Declaration, DomainConfig};
 use crate::order::InOrder;
 use crate::plan::{MappedEntry, plan};
 use crate::segment::setup::declared_areas;

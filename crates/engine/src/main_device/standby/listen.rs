@@ -3,11 +3,11 @@
 
 use ringcat_wire::master_frame::{Diagnosis, DomainRecord};
 
-use super::MainDevice;
 use super::listener::{Listener, PartnerDiagnosis, PartnerStatus, known};
 use crate::event::{Event, StandbyEvent};
 use crate::knowledge::Knowledge;
 use crate::link::Link;
+use crate::main_device::MainDevice;
 use crate::role::MainDeviceRole;
 use crate::time::Instant;
 
@@ -39,7 +39,7 @@ impl MainDevice {
     }
 
     /// Reports that the ACTIVE has master frames of a version that cannot be read.
-    pub(super) fn report_version(&mut self, now: Instant) {
+    pub(in crate::main_device) fn report_version(&mut self, now: Instant) {
         let Some(standby) = &mut self.standby else { return };
         if let Some((least, got)) = standby.words.other_version()
             && standby.other_version.replace(got) != Some(got)
@@ -75,7 +75,7 @@ impl MainDevice {
     }
 
     /// What this MainDevice knew of the segment when it was ACTIVE last.
-    pub(super) fn published_knowledge(&self) -> Option<Knowledge> {
+    pub(in crate::main_device) fn published_knowledge(&self) -> Option<Knowledge> {
         known(&self.standby.as_ref()?.words.knowledge)
     }
 }

@@ -1,7 +1,7 @@
 //! Messages of the acyclic half: which are reported, and the last ones.
 
-use super::MainDevice;
 use crate::event::{LogFilter, Message, MessagesSince};
+use crate::main_device::MainDevice;
 
 impl MainDevice {
     /// Sets which messages are reported from now on. It stays over activations and stops.

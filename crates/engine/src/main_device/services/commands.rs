@@ -1,6 +1,6 @@
 //! Reports of single datagrams with wrong working counters.
 
-use super::MainDevice;
+use crate::main_device::MainDevice;
 use crate::procedures::command_watch::watch_commands;
 
 impl MainDevice {
@@ -16,7 +16,7 @@ impl MainDevice {
     }
 
     /// Starts the procedure, if it is wanted.
-    pub(super) fn begin_command_reports(&mut self) {
+    pub(in crate::main_device) fn begin_command_reports(&mut self) {
         let bus = self.supervisor.bus();
         if bus.are_commands_reported() {
             self.supervisor.spawn(watch_commands(bus, self.segment.clone()));

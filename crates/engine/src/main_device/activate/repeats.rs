@@ -8,12 +8,12 @@ use alloc::vec::Vec;
 
 use ringcat_wire::register::SyncManagerMode;
 
-use super::areas::Areas;
 use super::sent_once::SentOnce;
 use crate::config::{Repetition, StartupAction, SubDeviceConfig};
 use crate::direction::Direction;
 use crate::info::SubDeviceInfo;
 use crate::layout::{OutputsAgain, RepeatRule};
+use crate::main_device::declaration::areas::Areas;
 
 /// The object with the synchronisation type of outputs (ETG.1020), and its value for free run.
 const SYNC_TYPE: (u16, u8) = (0x1C32, 1);
@@ -30,7 +30,7 @@ const fn restricted(reason: SentOnce) -> RepeatRule {
 }
 
 /// For each SubDevice its rule, or the reason for which not everything is repeated.
-pub(super) fn of_all(
+pub(in crate::main_device) fn of_all(
     configs: &[SubDeviceConfig],
     plans: &[Areas],
     found: &[Option<Rc<SubDeviceInfo>>],
@@ -40,7 +40,7 @@ pub(super) fn of_all(
 }
 
 /// The rules alone.
-pub(super) fn rules(of_all: &[Result<RepeatRule, SentOnce>]) -> Vec<RepeatRule> {
+pub(in crate::main_device) fn rules(of_all: &[Result<RepeatRule, SentOnce>]) -> Vec<RepeatRule> {
     of_all.iter().map(|it| it.unwrap_or_else(restricted)).collect()
 }
 

@@ -11,19 +11,19 @@ use alloc::vec::Vec;
 use core::hash::{Hash, Hasher};
 use core::time::Duration;
 
-use super::declaration::{Declaration, DomainConfig, DomainMember};
-use super::options::Options;
-use super::registered_area::RegisteredArea;
 use super::standby_options::StandbyOptions;
 use crate::config::{ConfigPart, Digest};
 use crate::direction::Direction;
+use crate::main_device::declaration::registered_area::RegisteredArea;
+use crate::main_device::declaration::{Declaration, DomainConfig, DomainMember};
+use crate::main_device::options::Options;
 
 /// Items before those of SubDevices.
 const COMMON: usize = 3;
 
 /// Digests of a configuration.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Configuration {
+pub(in crate::main_device) struct Configuration {
     items: Arc<[u32]>,
 }
 
