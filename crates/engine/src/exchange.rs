@@ -139,7 +139,7 @@ pub struct Exchange {
     newest: u16,
     /// When the next cycle is expected to begin.
     next_at: Instant,
-    /// Shortest period of a domain.
+    /// Shortest period of a domain that has one.
     base_ns: u64,
     /// The ring is closed, as far as the ways of frames are concerned.
     is_closed: bool,

@@ -1,6 +1,6 @@
 /*
  * ringcat.h: what RingCAT adds to ecrt.h. Networks from a network file (docs/network-file.md of RingCAT) or from an ENI
- * of a configuration tool (docs/eni.md).
+ * of a configuration tool (docs/eni.md); lost frames that are sent again within their cycle (docs/redundancy.md).
  *
  * A program that loads one of them declares nothing itself: SubDevices with their PDOs, start-up commands and SYNC
  * signals, and the domains, are those of the file. The other functions of ecrt.h work as ever: requests and mailbox
@@ -77,6 +77,26 @@ EC_PUBLIC_API ec_domain_t *ringcat_master_domain(ec_master_t *master, const char
  * Returns 0, or -ENOENT: there is none, or no domain exchanges it; -EPERM: not reserved; -EFAULT: NULL.
  */
 EC_PUBLIC_API int ringcat_master_variable(ec_master_t *master, const char *name, ringcat_variable_t *variable);
+
+/*
+ * Lost frames of a domain are sent again within their cycle (1), or not (0, as without this call). A network file has
+ * the same as `send_again`. It needs a free wire until the next ecrt_master_send(), which is expected after the time of
+ * ecrt_master_set_send_interval(); without it after the shortest period of the network file, or 1 ms.
+ *
+ * Returns 0, or -EBUSY: the master is active; -EINVAL: the handle has ended or is NULL.
+ */
+EC_PUBLIC_API int ringcat_domain_send_again(ec_domain_t *domain, int on);
+
+/*
+ * When ecrt_master_receive() is to be called again, so that a frame that is lost by then is sent again: a time of
+ * CLOCK_MONOTONIC in nanoseconds, UINT64_MAX if no frame is waited for. A cycle then is: send; receive when frames
+ * usually are back; receive at this time, as long as it is before the next cycle; receive, process, queue. Fit for a
+ * real-time thread.
+ *
+ * Returns 0, or -EPERM: not reserved; -EBUSY: another thread makes a cyclic call; -EFAULT: time_ns is NULL; -ENODEV:
+ * the daemon has taken the bus back; -EINVAL: the handle has ended or is NULL.
+ */
+EC_PUBLIC_API int ringcat_master_receive_again_at(ec_master_t *master, uint64_t *time_ns);
 
 #ifdef __cplusplus
 }

@@ -3,6 +3,8 @@
 //! A bus that the daemon has taken back, because the process was stopped, shows with the next call that receives: from
 //! then on all cyclic calls are refused until the handle is deactivated or released.
 
+use std::time::Duration;
+
 use ringcat::daemon::OwnershipWatch;
 use ringcat::{Application, Instant, SupervisorThread};
 
@@ -113,6 +115,13 @@ impl Active {
             }
         }
         self.application.send();
+    }
+
+    /// The time until receive is to be called so that a frame that is lost by then is sent again; `None` if no frame
+    /// is waited for.
+    pub fn receive_again_in(&self) -> Option<Duration> {
+        let at = self.application.receive_again_at();
+        (at != Instant::NEVER).then(|| at.since(self.application.now()))
     }
 
     /// The next call of send distributes time.

@@ -3,6 +3,7 @@
 //! Pointers of C are checked here and nowhere else. A handle that is NULL, or was ended by deactivation or release, is
 //! found out by its mark. Functions end in a call of the safe modules.
 
+mod again;
 mod cyclic;
 mod data;
 mod handle;

@@ -19,6 +19,10 @@ pub struct Draft {
     declaration: Declaration,
     settings: Vec<Settings>,
     domains: Vec<Arc<DomainWords>>,
+    /// Time from one send to the next that the program expects.
+    send_interval: Option<Duration>,
+    /// Shortest period of a network file.
+    file_period: Option<Duration>,
     reference: Option<usize>,
     /// Of a network file.
     names: Names,
@@ -29,11 +33,6 @@ impl Draft {
     /// Takes over the result of the last scan.
     pub fn set_found(&mut self, found: Vec<SubDeviceInfo>) {
         self.found = found;
-    }
-
-    /// The result of the last scan that it follows.
-    pub fn found(&self) -> Vec<SubDeviceInfo> {
-        self.found.clone()
     }
 
     /// The index of a SubDevice with a name, if it was declared before.
@@ -61,6 +60,32 @@ impl Draft {
         let words = Arc::new(DomainWords::default());
         self.domains.push(words.clone());
         (self.declaration.add_domain(Duration::ZERO), words)
+    }
+
+    /// Whether lost frames of a domain are sent again within their cycle.
+    ///
+    /// # Errors
+    /// There is no such domain.
+    pub fn set_sends_again(&mut self, domain: DomainId, sends_again: bool) -> Outcome {
+        self.declaration.domains.get_mut(domain.0).ok_or(Code::INVALID)?.sends_again = sends_again;
+        Ok(())
+    }
+
+    /// The expected time from one send to the next; 0: it is not known.
+    pub fn set_send_interval(&mut self, interval: Duration) {
+        self.send_interval = (!interval.is_zero()).then_some(interval);
+    }
+
+    /// The expected time from one send to the next. Without one of the program it is the shortest period of a network
+    /// file.
+    pub fn send_interval(&self) -> Option<Duration> {
+        self.send_interval.or(self.file_period)
+    }
+
+    /// Nothing is declared any more; what the scan has found and the program expects stays.
+    pub fn clear(&mut self) {
+        let (found, send_interval) = (std::mem::take(&mut self.found), self.send_interval);
+        *self = Draft { found, send_interval, ..Draft::default() };
     }
 
     /// The domains.
@@ -101,11 +126,14 @@ impl Draft {
         let mut areas = Vec::new();
         for domain in &loaded.domains {
             let (id, _) = self.add_domain();
+            self.set_sends_again(id, domain.sends_again)?;
             for member in &domain.members {
                 self.place(id, member.subdevice, member.sync_managers.as_deref(), &mut areas)?;
             }
             self.registered(id);
         }
+        let shortest = loaded.domains.iter().map(|domain| domain.period).filter(|period| !period.is_zero()).min();
+        self.file_period = shortest;
         self.names = network::names(&file.configuration, &file.domains, &areas);
         Ok(())
     }

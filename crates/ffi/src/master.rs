@@ -223,12 +223,10 @@ impl Master {
             return Err(Code::INVALID);
         }
         self.change(|draft| {
-            let found = draft.found();
             let loaded = draft.load(file);
             // A network is declared as a whole or not at all.
             if loaded.is_err_and(|code| code != Code::BUSY) {
-                *draft = Draft::default();
-                draft.set_found(found);
+                draft.clear();
             }
             loaded
         })
@@ -263,7 +261,7 @@ impl Master {
             }
         }
         self.has_clock.store(draft.has_clock(), Ordering::Release);
-        let begun = self.begin(&bus, declaration, draft.domains().len());
+        let begun = self.begin(&bus, declaration, &draft);
         match &begun {
             Ok(()) => self.is_active.store(true, Ordering::Release),
             Err(_) => draft.domains().iter().for_each(|words| words.set_memory(std::ptr::null_mut())),
@@ -271,7 +269,7 @@ impl Master {
         begun
     }
 
-    fn begin(&self, bus: &Bus, declaration: Declaration, domains: usize) -> Outcome {
+    fn begin(&self, bus: &Bus, declaration: Declaration, draft: &Draft) -> Outcome {
         let links = bus.take_links().ok_or(Code::BUSY)?;
         self.is_ring.store(links.addresses().redundant.is_some(), Ordering::Relaxed);
         let supervisor = bus.supervisor().clone();
@@ -285,13 +283,16 @@ impl Master {
             Err(refused) => {
                 report(format_args!("master {}: {}", bus.master(), refused.error));
                 let ringcat::Ended { supervisor, links, .. } = refused.main_device;
-                let unused = (0..domains).filter_map(|domain| supervisor.unused_memory(DomainId(domain)));
+                let unused = (0..draft.domains().len()).filter_map(|domain| supervisor.unused_memory(DomainId(domain)));
                 locked(&self.memory).extend(unused);
                 bus.give_links_back(links);
                 return Err(Code::INVALID);
             }
         };
         application.set_clock_datagrams(ClockDatagrams::Called);
+        if let Some(interval) = draft.send_interval() {
+            application.expect_sends_every(interval);
+        }
         let now = application.now();
         let Given { first, last } = std::mem::take(&mut *locked(&self.given));
         if let Some((time, at)) = first {
@@ -351,7 +352,7 @@ impl Master {
             }
         };
         bus.give_links_back(ended.links);
-        *draft = Draft::default();
+        draft.clear();
         self.application_time.store(0, Ordering::Relaxed);
         *locked(&self.given) = Given::default();
         self.follow_live_status(&bus);

@@ -34,6 +34,8 @@ const LATE_FRACTION: u64 = 10;
 const PAUSE_LOOK: Duration = Duration::from_micros(20);
 /// Period of an application without a domain that has one.
 const IDLE_PERIOD: Duration = Duration::from_millis(1);
+/// Shortest time from one cycle to the next.
+const SHORTEST_PERIOD: Duration = Duration::from_micros(1);
 
 /// What is published of the states of the domains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,7 +94,7 @@ impl Cyclic {
     pub fn new(active: Active, window: Arc<Window>, now: Instant) -> Cyclic {
         let periods = active.periods;
         let shortest = periods.iter().copied().filter(|period| !period.is_zero()).min();
-        let period = shortest.unwrap_or(IDLE_PERIOD).max(Duration::from_micros(1));
+        let period = shortest.unwrap_or(IDLE_PERIOD).max(SHORTEST_PERIOD);
         let rate = |domain: &Duration| Rate::new(*domain, period);
         let next_cycle = now + period;
         let period_ns = u64::try_from(period.as_nanos()).unwrap_or(u64::MAX);

@@ -1,5 +1,7 @@
 //! The parts of a cycle with a probe, for an application with its own loop.
 
+use std::time::Duration;
+
 use ringcat_engine::domain::{DomainId, DomainStatus};
 use ringcat_engine::time::Instant;
 
@@ -38,6 +40,13 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// Lost frames are sent again meanwhile where the declaration allows it.
     pub fn receive_until(&mut self, until: Instant) -> bool {
         self.probed(&mut ()).receive_until(until)
+    }
+
+    /// Sets the expected time from one [`Application::send`] to the next, for an application with its own loop. Frames
+    /// that are sent again must be back before the next send, and the acyclic half keeps the wire free for it. Without
+    /// this it is the shortest period of the domains, or 1 ms if none has a period.
+    pub fn expect_sends_every(&mut self, period: Duration) {
+        self.cyclic.expect_sends_every(period);
     }
 
     /// Whether the acyclic half requests an empty wire now, to measure the delays of clocks

@@ -103,7 +103,10 @@ impl AnsweringDouble {
             let Some(answer) = self.answers.iter().find(|answer| answer.key == *key) else { continue };
             frame[SOURCE_AT] |= PROCESSED;
             for patch in &answer.patches {
-                frame[patch.at..patch.at + WKC_LEN].copy_from_slice(&patch.wkc[link.index()].to_le_bytes());
+                // A frame that is sent again has no supervision datagram.
+                if let Some(wkc) = frame.get_mut(patch.at..patch.at + WKC_LEN) {
+                    wkc.copy_from_slice(&patch.wkc[link.index()].to_le_bytes());
+                }
             }
             if let Some(Shown { at, bytes }) = &answer.presence {
                 let bytes = &bytes[link.index()];

@@ -11,8 +11,8 @@ use std::io::{self, Error, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// Cycles that a part of a profile has, where it has parts.
-pub const BATCH: u64 = 50;
+/// Cycles that a part of a profile has, where it has parts: the work of each 64th cycle comes twice.
+pub const BATCH: u64 = 128;
 
 /// Cost of a run of a program.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -14,7 +14,7 @@ use ringcat_engine::Identity;
 use ringcat_engine::direction::Direction;
 use ringcat_engine::domain::{DomainId, DomainStatus};
 use ringcat_engine::exchange::Exchange;
-use ringcat_engine::layout::{AreaSpec, DomainSpec, ImageOrder, Layout, LayoutError};
+use ringcat_engine::layout::{AreaSpec, DomainSpec, ImageOrder, Layout, LayoutError, RepeatRule};
 use ringcat_engine::link::LinkSet;
 use ringcat_engine::time::Instant;
 use ringcat_engine::{Consumer, queue};
@@ -27,6 +27,8 @@ use crate::answering_double::{AnsweringDouble, Cabling};
 pub const PERIOD: Duration = Duration::from_millis(1);
 /// Frames that fit into each queue of the links.
 const LINK_QUEUE: usize = 64;
+/// Time from departure to return of frames, where lost frames are sent again.
+const FLIGHT: Duration = Duration::from_micros(50);
 /// Events that fit between the halves.
 const EVENTS: usize = 64;
 const MAIN: MacAddress = MacAddress([0x00, 0x00, 0x5E, 0x00, 0x53, 0x01]);
@@ -89,6 +91,19 @@ impl CyclicLoad {
     /// # Errors
     /// Process data that cannot be laid out.
     pub fn new(spec: &LoadSpec) -> Result<CyclicLoad, LayoutError> {
+        CyclicLoad::with(spec, |_, _| ())
+    }
+
+    /// The same, and lost frames are sent again within their cycle: for [`CyclicLoad::cycle_with_tries`].
+    ///
+    /// # Errors
+    /// Process data that cannot be laid out.
+    pub fn sending_again(spec: &LoadSpec) -> Result<CyclicLoad, LayoutError> {
+        let rules = vec![RepeatRule::default(); spec.subdevices];
+        CyclicLoad::with(spec, |exchange, layout| exchange.send_lost_frames_again(layout, &rules, |_| true))
+    }
+
+    fn with(spec: &LoadSpec, set_up: impl FnOnce(&mut Exchange, &Layout)) -> Result<CyclicLoad, LayoutError> {
         let (links, redundant) = match spec.cabling {
             Cabling::Line => (LinkSet::Single, None),
             Cabling::ClosedRing | Cabling::CutRing { .. } => (LinkSet::Ring, Some(REDUNDANT)),
@@ -100,8 +115,10 @@ impl CyclicLoad {
         }
         let (producer, events) = queue(EVENTS);
         let identity = Identity::new(MacCodec::FlagsFirst, MAIN, redundant);
+        let mut exchange = Exchange::new(identity, links, &layout, board.clone(), producer);
+        set_up(&mut exchange, &layout);
         Ok(CyclicLoad {
-            exchange: Exchange::new(identity, links, &layout, board.clone(), producer),
+            exchange,
             links: MemoryLinks::new(MAIN, redundant, LINK_QUEUE),
             board,
             events,
@@ -133,6 +150,40 @@ impl CyclicLoad {
         }
         exchange.send(*now, &mut |link, frame| links.send(link, frame));
         black_box(status)
+    }
+
+    /// A whole cycle in which lost frames are sent again, segment included: frames leave, `lose` takes some of them
+    /// from the links, the others come back, and what is lost is sent again until the next cycle begins.
+    pub fn cycle_with_tries(&mut self, lose: impl FnOnce(&mut MemoryLinks)) {
+        let CyclicLoad { exchange, links, now, .. } = self;
+        for domain in (0..exchange.domain_count()).map(DomainId) {
+            exchange.process(domain, *now);
+            exchange.queue(domain, *now);
+        }
+        exchange.send(*now, &mut |link, frame| links.send(link, frame));
+        let end = *now + PERIOD;
+        exchange.expect_next(end);
+        exchange.follow_departures(*now);
+        lose(links);
+        self.come_back();
+        while self.exchange.decide_at() < end {
+            self.now = self.now.max(self.exchange.decide_at());
+            let CyclicLoad { exchange, links, now, .. } = self;
+            exchange.decide(*now, *now, &mut |link, frame| links.send(link, frame));
+            self.come_back();
+        }
+        self.now = end;
+    }
+
+    /// The segment answers, and the frames are received.
+    fn come_back(&mut self) {
+        self.answer();
+        self.now += FLIGHT;
+        let CyclicLoad { exchange, links, now, .. } = self;
+        links.set_now(*now);
+        while links.receive(&mut |link, frame| {
+            exchange.receive_and_follow(link, frame, *now);
+        }) {}
     }
 
     /// The segment's part of a cycle.

@@ -120,6 +120,33 @@ fn disturbed_cycles_do_not_allocate() {
     }
 }
 
+// covers: no-allocation, lost-frames
+#[test]
+fn frames_that_are_lost_and_sent_again_do_not_allocate() {
+    for cabling in CABLINGS {
+        let lrw = cabling == Cabling::Line;
+        let spec =
+            LoadSpec { subdevices: SUBDEVICES, bytes: 60, domains: 3, under_way: 1, lrw, supervision: true, cabling };
+        let mut load = CyclicLoad::sending_again(&spec).expect("fits");
+        let used = counted(|| {
+            for cycle in 0..CYCLES {
+                load.cycle_with_tries(|links| match cycle % 10 {
+                    // All frames are lost, or one copy.
+                    0 if cycle > 200 => while links.sent.pop().is_some() {},
+                    5 if cycle > 200 => drop(links.sent.pop()),
+                    _ => (),
+                });
+            }
+        });
+        assert_eq!(used, (0, 0), "{cabling:?}");
+        let counters = load.exchange.counters();
+        println!("{cabling:?}: {} sent again, {} saved", counters.sent_again, counters.saved);
+        // All three domains in each tenth cycle at least.
+        assert!(counters.saved >= 3 * (CYCLES - 210) / 10, "{cabling:?}: {counters:?}");
+        assert_eq!(counters.incomplete, 0, "{cabling:?}");
+    }
+}
+
 // covers: capture
 #[test]
 fn recorded_cycles_do_not_allocate() {

@@ -4,6 +4,7 @@ mod answers;
 mod parts;
 #[cfg(feature = "standby")]
 mod standby;
+mod tries;
 mod under_way;
 
 use core::time::Duration;

@@ -56,7 +56,8 @@ impl Exchange {
             }
         }
         self.is_alone = again.len() == 1;
-        self.base_ns = layout.domains.iter().map(|domain| domain.period.as_nanos() as u64).min().unwrap_or(0);
+        let periods = layout.domains.iter().map(|domain| domain.period.as_nanos() as u64);
+        self.base_ns = periods.filter(|period| *period > 0).min().unwrap_or(0);
         self.again = again;
     }
 
@@ -67,7 +68,7 @@ impl Exchange {
     }
 
     /// The next cycle begins then: frames that are sent again must be back before. Without this, a period after the
-    /// departure.
+    /// departure; frames of domains without a period are not sent again then.
     #[inline(always)]
     pub fn expect_next(&mut self, at: Instant) {
         self.next_at = at;
@@ -276,7 +277,8 @@ impl Exchange {
         let (Some(frame), Some(Some(again))) = (self.frames.get(index), self.again.get_mut(index)) else { return };
         let Some(domain) = self.domains.get(frame.domain()).filter(|_| frame.is_complete()) else { return };
         if again.way.is_later(now) {
-            again.way.learn(sent_at(frame, domain.timeout_ns()), now, is_closed);
+            let was_sent = again.was_sent(frame.left());
+            again.way.learn(sent_at(frame, domain.timeout_ns()), now, is_closed, was_sent);
         }
         again.way.arrive();
     }
@@ -355,16 +357,17 @@ enum Next {
     Never,
 }
 
-/// When a cycle of a domain is evaluated: frames must be back before.
+/// When a cycle of a domain is evaluated: frames must be back before. Without a period this is the next send.
 fn end_of_cycle(domain: &Domain, first: &CyclicFrame, cycle: u64, base_ns: u64, next_at: Instant) -> Instant {
     let period_ns = domain.period_ns();
     let begun = sent_at(first, domain.timeout_ns());
     let by_period = Instant(begun.0.saturating_add(period_ns));
-    if next_at == Instant::NEVER || base_ns == 0 {
+    if next_at == Instant::NEVER {
         return by_period;
     }
     // The next cycle is that of the shortest period.
-    let later = (period_ns / base_ns).saturating_sub(1 + cycle.saturating_sub(first.left()));
+    let Some(cycles) = period_ns.checked_div(base_ns).filter(|cycles| *cycles > 0) else { return next_at };
+    let later = cycles.saturating_sub(1 + cycle.saturating_sub(first.left()));
     by_period.min(Instant(next_at.0.saturating_add(later * base_ns)))
 }
 

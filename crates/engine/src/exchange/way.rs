@@ -1,8 +1,14 @@
 //! How long a frame takes to come back, learned from its flights, and how long it is waited for.
 //!
 //! Input: times of departure and return as measured by the host. Output: the time after departure at which a frame that
-//! is not back is lost. This time is never shorter than the way of an open ring, which is up to twice the closed one,
-//! plus a margin. Nothing is known before the first flights.
+//! is not back is lost. This time is never shorter than the way of an open ring plus a margin. An open ring takes up to
+//! twice the time on the wire; this time is not longer than any flight of the closed ring, while the longest flight
+//! includes delays of the host. Nothing is known before the first flights.
+//!
+//! Flights are grouped in windows, which [`Way::refresh`] ends; the way is the longest of the last two. A frame that is
+//! received after its wait and was not sent again was back when that was decided: the host was delayed, or receives at
+//! the end of the wait only, and the wait is long enough. It does not count. A return after a second try shows that the
+//! wait is too short, and doubles the way at most (decision 0206).
 
 use crate::time::Instant;
 
@@ -11,16 +17,19 @@ const FOREVER: u64 = u64::MAX / 4;
 /// Margin: this part of the way, and a constant for the host.
 const MARGIN_PART: u64 = 8;
 const MARGIN_NS: u64 = 10_000;
-/// The learned way shrinks by this part, so that one late return is forgotten. Less than the margin.
-const SHRINK_PART: u64 = 16;
-
 /// The way of a frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Way {
-    /// Longest recent time from departure to return.
+    /// Longest time from departure to return in this window and the last one.
     ns: u64,
+    /// The same in this window.
+    window_ns: u64,
     /// The same while the ring was closed; 0 if it is not known.
     closed_ns: u64,
+    /// A short flight of the closed ring in this window or the last one: at least the time on the wire.
+    wire_ns: u64,
+    /// The same in this window; [`FOREVER`] before the first flight.
+    window_wire_ns: u64,
     /// A frame that is not back after this time is lost.
     wait_ns: u64,
     /// A return after this time makes the way longer.
@@ -29,7 +38,15 @@ pub(crate) struct Way {
 
 impl Default for Way {
     fn default() -> Way {
-        Way { ns: 0, closed_ns: 0, wait_ns: FOREVER, soon: Instant::NEVER }
+        Way {
+            ns: 0,
+            window_ns: 0,
+            closed_ns: 0,
+            wire_ns: FOREVER,
+            window_wire_ns: FOREVER,
+            wait_ns: FOREVER,
+            soon: Instant::NEVER,
+        }
     }
 }
 
@@ -37,7 +54,7 @@ impl Way {
     /// The frame leaves. Returns when it is lost if it is not back.
     #[inline(always)]
     pub fn depart(&mut self, now: Instant) -> Instant {
-        self.soon = Instant(now.0.wrapping_add(self.ns));
+        self.soon = Instant(now.0.wrapping_add(self.window_ns));
         Instant(now.0.wrapping_add(self.wait_ns))
     }
 
@@ -47,36 +64,45 @@ impl Way {
         self.soon = Instant::NEVER;
     }
 
-    /// Whether a return now is later than the returns before.
+    /// Whether a return now is later than the returns before in this window.
     #[inline(always)]
     pub fn is_later(&self, now: Instant) -> bool {
         now > self.soon
     }
 
-    /// A frame came back later than the ones before. One return at most doubles the way.
+    /// A frame came back later than the ones before in this window. `was_sent`: it was sent again. One return doubles
+    /// the way at most.
     #[cold]
-    pub fn learn(&mut self, sent_at: Instant, now: Instant, is_closed: bool) {
+    pub fn learn(&mut self, sent_at: Instant, now: Instant, is_closed: bool, was_sent: bool) {
         let taken = now.0.saturating_sub(sent_at.0).min(FOREVER / 8);
-        self.ns = if self.ns == 0 { taken } else { taken.min(2 * self.ns) };
+        if taken >= self.wait_ns && !was_sent {
+            return;
+        }
+        let taken = if self.ns == 0 { taken } else { taken.min(2 * self.ns) };
+        self.window_ns = self.window_ns.max(taken);
+        self.ns = self.ns.max(taken);
         if is_closed {
             self.closed_ns = self.ns;
+            self.window_wire_ns = self.window_wire_ns.min(taken);
+            self.wire_ns = self.wire_ns.min(taken);
         }
         if self.is_known() {
             self.set_wait();
         }
     }
 
-    /// Applies what was learned, and forgets a part of it.
+    /// A window ends: applies what was learned in it, and forgets the windows before.
     #[cold]
     pub fn refresh(&mut self, is_closed: bool) {
-        if self.ns == 0 {
+        if self.window_ns == 0 {
             return;
         }
-        self.set_wait();
-        self.ns -= self.ns / SHRINK_PART;
+        self.ns = core::mem::take(&mut self.window_ns);
         if is_closed {
             self.closed_ns = self.ns;
+            self.wire_ns = core::mem::replace(&mut self.window_wire_ns, FOREVER).min(self.ns);
         }
+        self.set_wait();
     }
 
     /// The ring has opened or closed.
@@ -88,6 +114,7 @@ impl Way {
         } else {
             self.ns = self.longest_ns();
         }
+        self.window_ns = 0;
         if self.is_known() {
             self.set_wait();
         }
@@ -100,7 +127,7 @@ impl Way {
 
     /// The longest way that the frame may take, in nanoseconds.
     pub fn longest_ns(&self) -> u64 {
-        self.ns.max(2 * self.closed_ns)
+        self.ns.max(self.closed_ns + self.wire_ns.min(self.closed_ns))
     }
 
     /// Whether enough flights came back.
@@ -122,7 +149,7 @@ mod tests {
         way.depart(Instant(1_000));
         let now = Instant(1_000 + taken);
         if way.is_later(now) {
-            way.learn(Instant(1_000), now, is_closed);
+            way.learn(Instant(1_000), now, is_closed, false);
         }
     }
 
@@ -150,19 +177,88 @@ mod tests {
         }
     }
 
+    /// A window of flights of 100 us. Some, by their cycles, came back after 9 ms, and were sent again or not.
+    fn window(way: &mut Way, late: &[u64], was_sent: bool) {
+        for cycle in 0..64 {
+            if late.contains(&cycle) {
+                way.depart(Instant(1_000));
+                way.learn(Instant(1_000), Instant(9_001_000), false, was_sent);
+            } else {
+                flight(way, 100_000, false);
+            }
+        }
+        way.refresh(false);
+    }
+
     // covers: lost-frames
     #[test]
-    fn one_late_return_doubles_the_way_at_most_and_is_forgotten() {
+    fn a_frame_that_was_back_before_it_was_sent_again_does_not_change_the_wait() {
         let mut way = Way::default();
-        flight(&mut way, 100_000, false);
-        way.refresh(false);
-        flight(&mut way, 9_000_000, false);
-        assert!(way.wait_ns() <= 235_000, "{}", way.wait_ns());
-        for _ in 0..20 {
-            way.refresh(false);
-            flight(&mut way, 100_000, false);
+        window(&mut way, &[], false);
+        let usual = way.wait_ns();
+        for late in [&[0][..], &[30], &[63], &[10, 11, 12, 40]] {
+            window(&mut way, late, false);
+            assert_eq!(way.wait_ns(), usual, "the host was late in cycles {late:?}");
         }
-        assert!(way.wait_ns() <= 135_000, "{}", way.wait_ns());
+        // A loop that receives at the end of the wait only.
+        for cycle in 0..1_000 {
+            flight(&mut way, usual, false);
+            assert_eq!(way.wait_ns(), usual, "cycle {cycle}");
+            if cycle % 64 == 0 {
+                way.refresh(false);
+            }
+        }
+    }
+
+    // covers: lost-frames
+    #[test]
+    fn a_return_after_a_second_try_at_most_doubles_the_way_and_is_forgotten_soon() {
+        let mut way = Way::default();
+        window(&mut way, &[], false);
+        let usual = way.wait_ns();
+        for (late, most) in [(&[10][..], 235_000), (&[10, 11], 460_000)] {
+            window(&mut way, late, true);
+            assert!(way.wait_ns() > usual && way.wait_ns() <= most, "{late:?}: {}", way.wait_ns());
+            window(&mut way, &[], false);
+            assert_eq!(way.wait_ns(), usual, "{late:?}");
+        }
+    }
+
+    // covers: lost-frames
+    #[test]
+    fn a_way_that_has_become_longer_is_learned_in_a_few_flights() {
+        let mut way = Way::default();
+        window(&mut way, &[], false);
+        for _ in 0..3 {
+            way.depart(Instant(0));
+            way.learn(Instant(0), Instant(700_000), false, way.wait_ns() < 700_000);
+        }
+        assert!(way.longest_ns() == 700_000 && way.wait_ns() > 700_000, "{way:?}");
+    }
+
+    // covers: lost-frames
+    #[test]
+    fn an_open_ring_adds_the_way_on_the_wire_once_and_not_the_delays_of_the_host() {
+        let mut way = Way::default();
+        for cycle in 0..128 {
+            // 30 us on the wire, and up to 270 us until the host looks.
+            flight(&mut way, 30_000 + cycle % 64 * 17 % 10 * 30_000, true);
+            if cycle % 64 == 63 {
+                way.refresh(true);
+            }
+        }
+        assert_eq!(way.longest_ns(), 300_000 + 30_000);
+        way.change(false);
+        assert_eq!(way.longest_ns(), 330_000);
+        // The wire has become longer.
+        way.change(true);
+        (0..128).for_each(|cycle| {
+            flight(&mut way, 100_000, true);
+            if cycle % 64 == 63 {
+                way.refresh(true);
+            }
+        });
+        assert_eq!(way.longest_ns(), 200_000);
     }
 
     // covers: lost-frames

@@ -1,6 +1,7 @@
 //! Queries about the bus: states, links, SubDevices.
 
 use std::ffi::{c_int, c_uint};
+use std::time::Duration;
 
 use ringcat::{Link, Services};
 
@@ -123,8 +124,14 @@ unsafe extern "C" fn ecrt_master_reset(handle: *mut ec_master_t) -> c_int {
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn ecrt_master_set_send_interval(handle: *mut ec_master_t, _send_interval: usize) -> c_int {
-    // Checked and not used: the engine leaves the wire free by the times at which frames really leave.
+unsafe extern "C" fn ecrt_master_set_send_interval(handle: *mut ec_master_t, send_interval: usize) -> c_int {
+    let interval = Duration::from_micros(u64::try_from(send_interval).unwrap_or(u64::MAX));
+    let set = |MasterObject(owner): &MasterObject| {
+        owner.master.change(|draft| {
+            draft.set_send_interval(interval);
+            Ok(())
+        })
+    };
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { call(handle, |master| master.0.master.change(|_| Ok(()))) }
+    unsafe { call(handle, set) }
 }

@@ -4,14 +4,16 @@ use std::io::{BufRead, BufReader, Write};
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use ringcat::AlState;
 use ringcat::esi::load_segment;
 use ringcat::piped::segment::PipedSegment;
+use ringcat::sim::cable::HostLink;
+use ringcat::sim::fault::Fault;
 use ringcat::sim::network::Network;
 use ringcatd::daemon::{Daemon, STOP_LIMIT};
 use ringcatd::master::Master;
@@ -24,6 +26,9 @@ use crate::library::{here, interrupted_after, program, root};
 /// A busy machine delays a change at most for so long.
 const LONG: Duration = Duration::from_secs(30);
 
+/// The segment turns at least once in a millisecond, unless this machine stalls.
+const STALL: Duration = Duration::from_millis(2);
+
 /// What the segment shows to the test.
 #[derive(Debug, Default)]
 struct Seen {
@@ -33,7 +38,31 @@ struct Seen {
     connected_ns: AtomicU64,
     /// A SubDevice has outputs that are not zero.
     outputs_are_set: AtomicBool,
+    /// A fault, and how long after the next frame on the main link it comes.
+    fault: Mutex<Option<(Fault, Duration)>>,
+    /// Times at which the segment went on after it had stood still, and for how long.
+    stalls: Mutex<Vec<(u64, Duration)>>,
     ends: AtomicBool,
+}
+
+/// CLOCK_MONOTONIC.
+fn monotonic_ns() -> u64 {
+    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: memory of this type.
+    unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut time) };
+    time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
+}
+
+/// Schedules an ordered fault when the main link has a new frame.
+fn schedule(network: &mut Network, frames: &mut u64, fault: &Mutex<Option<(Fault, Duration)>>) {
+    let sent = network.statistics().link(HostLink::Main).frames_sent;
+    if core::mem::replace(frames, sent) == sent {
+        return;
+    }
+    if let Some((fault, after)) = fault.lock().expect("no panic").take() {
+        let at = network.now() + after;
+        network.schedule(at, fault);
+    }
 }
 
 /// A daemon on the segment of a file.
@@ -65,7 +94,14 @@ impl Bench {
         let segment = std::thread::spawn(move || {
             let described = load_segment(&file).expect("it is right");
             let mut segment = PipedSegment::new(Network::from_description(described).expect("it is right"));
+            let mut frames = 0;
+            let mut last = Instant::now();
             let show = |segment: &mut PipedSegment| {
+                schedule(segment.network_mut(), &mut frames, &shown.fault);
+                if last.elapsed() > STALL {
+                    shown.stalls.lock().expect("no panic").push((monotonic_ns(), last.elapsed()));
+                }
+                last = Instant::now();
                 let has_outputs =
                     segment.network_mut().devices().any(|device| device.outputs().iter().any(|it| *it != 0));
                 shown.outputs_are_set.store(has_outputs, Ordering::Release);
@@ -106,6 +142,23 @@ impl Bench {
 
     pub fn outputs_are_set(&self) -> bool {
         self.seen.outputs_are_set.load(Ordering::Acquire)
+    }
+
+    /// A fault comes that long after the next frame on the main link. Returns when it is scheduled.
+    pub fn fault_after_a_frame(&self, fault: Fault, after: Duration) {
+        *self.seen.fault.lock().expect("no panic") = Some((fault, after));
+        let begin = Instant::now();
+        while self.seen.fault.lock().expect("no panic").is_some() {
+            assert!(begin.elapsed() < LONG, "no frame leaves");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// Whether the segment has stood still for at least `length` in the time before this one of CLOCK_MONOTONIC.
+    pub fn has_stalled(&self, length: Duration, before_ns: u64, time: Duration) -> bool {
+        let stalls = self.seen.stalls.lock().expect("no panic");
+        let first = before_ns.saturating_sub(time.as_nanos() as u64);
+        stalls.iter().any(|(end, stood)| *stood >= length && (first..before_ns).contains(end))
     }
 
     pub fn command(&self, program: &Path) -> Command {

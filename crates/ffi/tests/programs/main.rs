@@ -10,6 +10,7 @@ mod fake;
 mod hosts;
 mod library;
 mod linking;
+mod lossless;
 mod lost;
 mod machine;
 mod network;

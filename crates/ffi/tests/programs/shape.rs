@@ -35,8 +35,10 @@ fn both_libraries_export_the_103_functions_and_libethercat_those_of_ringcat_h() 
         if name == "libethercat.so.1" {
             let first = ["domain", "load_network", "subdevice", "variable"].map(|name| (name, "RINGCAT_1"));
             let second = ["load_eni", "load_eni_data", "load_network_data"].map(|name| (name, "RINGCAT_2"));
-            let added = first.into_iter().chain(second);
+            let third = [("receive_again_at", "RINGCAT_3")];
+            let added = first.into_iter().chain(second).chain(third);
             wanted.extend(added.map(|(name, version)| (format!("ringcat_master_{name}"), version.to_owned())));
+            wanted.insert("ringcat_domain_send_again".to_owned(), "RINGCAT_3".to_owned());
         }
         assert_eq!(exported(&library), wanted, "{name}");
         let headers = run(Command::new("readelf").arg("-d").arg(library));

@@ -1,9 +1,11 @@
 //! The steps of a cycle for an application with its own loop.
 
+use std::time::Duration;
+
 use ringcat_engine::domain::{DomainId, DomainStatus};
 use ringcat_engine::time::Instant;
 
-use super::{Cyclic, States};
+use super::{Cyclic, SHORTEST_PERIOD, States};
 use crate::links::Links;
 
 impl Cyclic {
@@ -19,6 +21,11 @@ impl Cyclic {
             self.observed.fill(self.cycle, now, &self.exchange, &self.rates);
         }
         status
+    }
+
+    /// The time from one send to the next, for an application with its own loop.
+    pub fn expect_sends_every(&mut self, period: Duration) {
+        self.period_ns = u64::try_from(period.max(SHORTEST_PERIOD).as_nanos()).unwrap_or(u64::MAX);
     }
 
     /// Sends the queued frames, for an application with its own loop: the next cycle is expected one period later.

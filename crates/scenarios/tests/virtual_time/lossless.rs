@@ -1,6 +1,8 @@
 //! Lost frames are sent again within their cycle: cuts and repairs of a ring, single losses, devices that must not see
 //! outputs twice. Evaluated by the domain's status and by the logs of the devices.
 
+mod own_loops;
+
 use std::time::Duration;
 
 use ringcat::{ClockConfig, Declaration, DomainState, Options, RawDatagram, Scan, SyncSignals, automatic};
@@ -18,9 +20,17 @@ use scenarios::segments::{descriptions, line, ring};
 use scenarios::world::World;
 
 const MS: Duration = Duration::from_millis(1);
-const DETECTIONS: [Duration; 4] =
-    [Duration::from_micros(10), Duration::from_micros(100), MS, Duration::from_millis(10)];
-const CYCLES: [Duration; 3] = [Duration::from_micros(250), MS, Duration::from_millis(4)];
+const US: Duration = Duration::from_micros(1);
+const CYCLES: [Duration; 3] = [US.saturating_mul(250), MS, MS.saturating_mul(4)];
+/// Largest number of lost cycles, and the bound, by the detection time of the ends: for each of [`CYCLES`].
+const EXPECTED: [(Duration, [usize; CYCLES.len()]); 4] = [
+    (US.saturating_mul(10), [0, 0, 0]),
+    (US.saturating_mul(100), [0, 0, 0]),
+    (MS, [4, 1, 0]),
+    (MS.saturating_mul(10), [40, 10, 2]),
+];
+/// The page with this table.
+const PAGE: &str = include_str!("../../../../docs/redundancy.md");
 /// Cycles until the ways of frames are known.
 const LEARNING: u64 = 200;
 
@@ -55,17 +65,33 @@ struct Row {
     sent_again: u64,
 }
 
+/// Longest time that a frame takes, in the closed ring and in one that is cut at its end, as the simulator shows it.
+fn ways(world: &mut World, count: usize) -> [u64; 2] {
+    let measure = |world: &mut World| {
+        world.application_mut().links_mut().measure_flights();
+        world.run_cycles(10);
+        world.application().links().flight_ns()
+    };
+    let closed = measure(world);
+    world.cut(CableId(count));
+    world.run_cycles(100);
+    let open = measure(world);
+    world.heal(CableId(count));
+    world.run_cycles(200);
+    [closed, open]
+}
+
 /// Cuts and repairs each cable in each phase of the cycle.
 fn edges(count: usize, detection: Duration, cycle: Duration, cables: &[usize], phases: u32) -> Row {
     let network = ring(descriptions(&kinds(count)), NetworkOptions::default().with_detection_delay(detection));
     let mut world = world(network, |scan| automatic(&scan.subdevices, cycle));
     world.evaluate_latched(false);
     world.compare_tries();
-    world.application_mut().links_mut().measure_flights();
-    world.run_cycles(10);
-    let flight = world.application().links().flight_ns();
     let wait = world.application().exchange().waits_for_ns().expect("the ways of frames are known");
-    let needed = detection.as_nanos() as u64 + 2 * flight + wait;
+    let [flight, open] = ways(&mut world, count);
+    // The host learns one way in a closed ring: the open one is at most twice as long.
+    assert!(wait > open && wait <= 2 * flight * 9 / 8 + 10_000, "r {wait} ns, {flight} ns closed, {open} ns open");
+    let needed = detection.as_nanos() as u64 + 2 * flight + open * 9 / 8 + 10_000;
     let allowed = (needed.div_ceil(cycle.as_nanos() as u64) as usize).saturating_sub(1);
     let mut row = Row { allowed, ..Row::default() };
     let rest = detection.as_nanos().div_ceil(cycle.as_nanos()) as u64 + 80;
@@ -99,6 +125,7 @@ fn edges(count: usize, detection: Duration, cycle: Duration, cables: &[usize], p
 #[test]
 fn cuts_and_repairs_cost_no_cycle_where_the_time_fits() {
     println!("{:>4} {:>9} {:>7} {:>7} {:>9} {:>9} {:>6}", "ring", "d", "T", "edges", "lost cut", "repair", "bound");
+    let mut worst = [[0; CYCLES.len()]; EXPECTED.len()];
     for count in [4, 10, 33] {
         let all: Vec<usize> = (0..=count).collect();
         let some = [0, 1, count / 2, count - 1, count];
@@ -108,16 +135,29 @@ fn cuts_and_repairs_cost_no_cycle_where_the_time_fits() {
             33 => (&some[1..4], 4),
             _ => (&some[..], 8),
         };
-        for detection in DETECTIONS {
-            for cycle in CYCLES {
+        for (of_detection, (detection, lost)) in worst.iter_mut().zip(EXPECTED) {
+            for ((of_cycle, cycle), bound) in of_detection.iter_mut().zip(CYCLES).zip(lost) {
                 let row = edges(count, detection, cycle, cables, phases);
                 let [cut, repair] = [0, 1].map(|edge| format!("{} ({})", row.worst[edge], row.sum[edge]));
                 let (d, t) = (format!("{detection:?}"), format!("{cycle:?}"));
                 println!("{count:>4} {d:>9} {t:>7} {:>7} {cut:>9} {repair:>9} {:>6}", row.edges, row.allowed);
                 assert!(row.sent_again > 0, "frames were lost at some edge");
+                *of_cycle = row.worst.into_iter().fold(*of_cycle, usize::max);
+                assert_eq!(row.allowed, bound, "ring of {count}, d {detection:?}, T {cycle:?}");
             }
         }
     }
+    for ((detection, lost), worst) in EXPECTED.into_iter().zip(worst) {
+        assert_eq!(worst, lost, "d {detection:?}");
+        let line = format!("| {} | {} | {} | {} |", shown(detection), lost[0], lost[1], lost[2]);
+        assert!(PAGE.lines().any(|of_page| of_page == line), "docs/redundancy.md has no line {line}");
+    }
+}
+
+/// As in the page.
+fn shown(detection: Duration) -> String {
+    let us = detection.as_micros();
+    if us.is_multiple_of(1_000) { format!("{} ms", us / 1_000) } else { format!("{us} us") }
 }
 
 /// Keeps more datagrams waiting than the acyclic half can send: reads of logical addresses that no SubDevice has.
@@ -145,7 +185,7 @@ impl FullLoad {
 #[test]
 fn a_full_acyclic_half_leaves_the_time_of_a_second_try_free() {
     const EDGES: u32 = 20;
-    let detection = DETECTIONS[0];
+    let detection = 10 * US;
     for (count, cycle) in [(4, CYCLES[0]), (10, CYCLES[1]), (33, CYCLES[1]), (10, CYCLES[2])] {
         let network = ring(descriptions(&kinds(count)), NetworkOptions::default().with_detection_delay(detection));
         let mut world = world(network, |scan| automatic(&scan.subdevices, cycle));
@@ -216,6 +256,34 @@ fn nothing_is_sent_again_in_undisturbed_cycles() {
         world.run_cycles(cycles);
         assert_eq!(world.application().cyclic_counters().sent_again, 0, "ring: {in_ring}");
         assert!(world.application().exchange().waits_for_ns().is_some());
+    }
+}
+
+/// The host wakes up late while a frame waits for it, and frames are lost later.
+// covers: lost-frames
+#[test]
+fn a_host_that_is_late_now_and_then_still_sends_lost_frames_again() {
+    const ROUNDS: u64 = 20;
+    // Single delays in each second, and a burst of them before a second without any.
+    for (delays, rest) in [(1, 150), (4, 300)] {
+        let mut world =
+            world(line(descriptions(&kinds(10)), NetworkOptions::default()), |scan| automatic(&scan.subdevices, MS));
+        world.evaluate_latched(false);
+        let usual = world.application().exchange().waits_for_ns().expect("the ways of frames are known");
+        let mark = world.mark();
+        for _ in 0..ROUNDS {
+            for _ in 0..delays {
+                world.stall(MS * 8 / 10);
+                world.run_cycles(2);
+            }
+            world.run_cycles(rest);
+            let wait = world.application().exchange().waits_for_ns().expect("it is known");
+            assert!(wait <= usual + usual / 8, "{delays} delays: {usual} ns have become {wait} ns");
+            world.fault(Fault::Drop { cable: CableId(1), direction: Some(Direction::AToB), count: 1 });
+            world.run_cycles(2);
+        }
+        assert_eq!(world.incomplete(mark), 0, "{delays} delays");
+        assert_eq!(world.application().cyclic_counters().saved, ROUNDS, "{delays} delays");
     }
 }
 

@@ -7,7 +7,7 @@
 //! and so do RingCAT and SOEM with 50; ethercrab sends several with 10 and 50, so its share there has more than one
 //! frame in it. Ratios compare programs that wait alike.
 
-use scenarios::figures::{Figures, median, of_blocks};
+use scenarios::figures::{Figures, NOISY, median, noise, of_blocks};
 
 use crate::bench::{Tried, Wire};
 use crate::others::Program;
@@ -31,8 +31,6 @@ const OTHERS: [Program; 3] = [Program::Pysoem { spins: true }, Program::Pysoem {
 const SPINNING_GOAL: f64 = 0.8;
 /// Our cycle while blocking, as a multiple of the best other that blocks: it is the kernel's wake-up.
 const BLOCKING_GOAL: f64 = 1.03;
-/// Blocks of one program that differ by more than this show a machine that is too noisy for ratios.
-const NOISY: f64 = 1.5;
 
 /// Blocks of one program.
 struct Series {
@@ -53,9 +51,7 @@ impl Series {
 
     /// The longest block as a multiple of the shortest.
     fn spread(&self) -> f64 {
-        let times = self.cycle_us();
-        let shortest = times.iter().copied().fold(f64::MAX, f64::min);
-        times.iter().copied().fold(0.0, f64::max) / shortest
+        noise(&self.cycle_us())
     }
 }
 
