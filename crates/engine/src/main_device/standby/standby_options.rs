@@ -15,9 +15,9 @@ pub struct StandbyOptions {
     /// default: they go on as they are.
     pub goes_through_init: bool,
     /// Most acyclic master frames per cycle, with Ethernet frames between both MainDevices
-    /// ([`partner_endpoint`](super::super::MainDevice::partner_endpoint)); at most 16 (protocol AC-03). 0 by default: no
-    /// Ethernet. The ACTIVE sends as many as its own options allow, and only if those of the other one are not 0 it is
-    /// answered.
+    /// ([`partner_endpoint`](super::super::MainDevice::partner_endpoint)); at most 16 (protocol AC-03). 0 by default:
+    /// no Ethernet. The ACTIVE sends as many as its own options allow, and only if those of the other one are not 0 it
+    /// is answered.
     pub max_acyclic: u8,
 }
 
