@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use core::ops::Deref;
 use core::time::Duration;
 
-use ringcat_wire::address::Position;
+use ringcat_wire::address::{Position, StationAddress};
 
 use super::key::SubDeviceKey;
 use super::knowledge::Knowledge;
@@ -33,7 +33,10 @@ pub struct Unassigned {
     pub reported: bool,
     /// Since this time several members are possible.
     pub(super) held_since: Option<Instant>,
-    /// Members that were lost after it was known to be undeclared: it is none of these, whatever its identity is.
+    /// Number of the first round in which it answered.
+    pub(super) answers_since: Option<u64>,
+    /// Members that answered while it was there or was known to be none of them: it is none of these, whatever its
+    /// identity is.
     pub(super) beside: Vec<usize>,
     /// Where the PDOs of its SII are known from when it is read.
     pub(super) pdo_source: PdoSource,
@@ -61,6 +64,7 @@ impl Unassigned {
             from_main: at.position < at.main_count,
             reported: false,
             held_since: None,
+            answers_since: None,
             beside: Vec::new(),
             pdo_source: PdoSource::Outdated,
             upkeep: None,
@@ -109,6 +113,15 @@ impl UnassignedView<'_> {
     pub(super) fn is_awaited(&self, now: Instant) -> bool {
         matches!(self.knowledge, Knowledge::Awaited(since) if now.since(*since) < HOLD)
     }
+}
+
+/// What the cables show of unassigned SubDevices.
+#[derive(Clone, Debug, Default)]
+pub struct ByCables {
+    /// SubDevices that are members.
+    pub members: Vec<(StationAddress, usize)>,
+    /// SubDevices at the places of those that were there without a declaration.
+    pub others: Vec<StationAddress>,
 }
 
 /// Unassigned SubDevices identified as members.

@@ -16,6 +16,7 @@ use crate::segment::knowledge::Knowledge;
 use crate::segment::model::Segment;
 use crate::segment::order::owners_of;
 use crate::segment::owners::Owners;
+use crate::segment::reading::Reading;
 use crate::segment::setup::Setup;
 use crate::segment::start::Start;
 use crate::segment::unassigned::{At, Unassigned};
@@ -60,8 +61,9 @@ impl Segment {
             if let Some(position) = view.position(key.station) {
                 let at = At { position, owners: &owners, main_count };
                 let beside = core::mem::take(&mut it.beside);
-                let Unassigned { reported, held_since, pdo_source, upkeep, .. } = *it;
-                *it = Unassigned { reported, held_since, beside, pdo_source, upkeep, ..Unassigned::at(&at) };
+                let Unassigned { reported, held_since, answers_since, pdo_source, upkeep, .. } = *it;
+                let kept = Unassigned { reported, held_since, answers_since, ..Unassigned::at(&at) };
+                *it = Unassigned { beside, pdo_source, upkeep, ..kept };
             }
         }
     }
@@ -144,10 +146,24 @@ impl Segment {
         }
     }
 
-    /// A member no longer answers. SubDevices that are known to be undeclared at this time are not this member.
+    /// SubDevices without a declaration were read in a round, before the members.
+    pub(in crate::segment) fn observe_others(&mut self, unassigned: &[(SubDeviceKey, Reading)]) {
+        let round = self.attention.rounds;
+        for (key, _) in unassigned.iter().filter(|(_, reading)| reading.is_answer()) {
+            if let Some((_, it)) = self.subdevices.unassigned_mut(*key) {
+                it.answers_since.get_or_insert(round);
+            }
+        }
+    }
+
+    /// A member that answered no longer does. SubDevices that were known to be undeclared then are others, and so are
+    /// those that had answered at their own addresses when the member did.
     pub(in crate::segment) fn tell_apart(&mut self, index: usize) {
+        let Some(answered) = self.member(index).map(|member| member.answered) else { return };
         for (_, knowledge, it) in self.subdevices.all_unassigned_mut() {
-            if it.reported && knowledge.info().is_some() && !it.beside.contains(&index) {
+            let was_known = it.reported && knowledge.info().is_some();
+            let was_there = it.answers_since.is_some_and(|since| since <= answered);
+            if (was_known || was_there) && !it.beside.contains(&index) {
                 it.beside.push(index);
             }
         }
@@ -198,7 +214,7 @@ impl Segment {
         let Some(member) = self.subdevices.member_mut(index) else { return };
         let Ok(setup) = Setup::new(index, &member.config, &info, &self.layout) else { return };
         member.take_setup(index, setup, effects);
-        member.configured = false;
+        (member.configured, member.answered) = (false, self.attention.rounds);
         self.subdevices.identify(index, info);
         self.tell_scan_of_member(index);
         self.subdevices.remove(|other| other == key);
