@@ -144,9 +144,16 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
     }
 }
 
+/// AL status codes of refusals of other requests: those of a procedure are valid in the state in which it makes them,
+/// and BOOT is requested by another procedure.
+const NEVER_AN_ANSWER: [AlStatusCode; 3] = [
+    AlStatusCode::INVALID_STATE_CHANGE,
+    AlStatusCode::BOOT_NOT_SUPPORTED,
+    AlStatusCode::INVALID_MAILBOX_CONFIGURATION_BOOT,
+];
+
 /// Another request took effect meanwhile: the SubDevice is in a state from which the requested one is not valid, has
-/// refused a request that was not the one of this procedure (AL status code 0x0011: all of this procedure are valid in
-/// the state in which they are made), or PREOP before its mailboxes were enabled (0x0016), or SAFEOP before its process
+/// refused a request that was not the one of this procedure, or PREOP before its mailboxes were enabled (0x0016), or SAFEOP before its process
 /// data was configured (0x001D, 0x001E).
 fn was_changed(error: &ConfigureError) -> bool {
     let (requested, code) = match error {
@@ -158,7 +165,7 @@ fn was_changed(error: &ConfigureError) -> bool {
     let is_mailbox = code == AlStatusCode::INVALID_MAILBOX_CONFIGURATION_PREOP;
     match requested {
         AlState::Boot => false,
-        _ if code == AlStatusCode::INVALID_STATE_CHANGE => true,
+        _ if NEVER_AN_ANSWER.contains(&code) => true,
         AlState::Init | AlState::PreOp => is_early.contains(&code) || is_mailbox,
         AlState::SafeOp => is_early.contains(&code),
         AlState::Op => false,

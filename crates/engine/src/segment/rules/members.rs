@@ -66,7 +66,7 @@ impl Segment {
         let needed = if counted == answering { 1 } else { SILENT_READS };
         let is_certain = self.evaluate(readings, before, needed, now, effects);
         if needed == 1 {
-            self.subdevices.remove(|key| unassigned.contains(&(key, Reading::Silent)));
+            self.subdevices.depart(|key| unassigned.contains(&(key, Reading::Silent)));
         }
         if !is_certain {
             // One quick repetition, and then the next round only when something changes.

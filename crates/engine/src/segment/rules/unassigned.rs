@@ -60,10 +60,9 @@ impl Segment {
         for (key, _, it) in self.subdevices.all_unassigned_mut() {
             if let Some(position) = view.position(key.station) {
                 let at = At { position, owners: &owners, main_count };
-                let beside = core::mem::take(&mut it.beside);
-                let Unassigned { reported, held_since, answers_since, pdo_source, upkeep, .. } = *it;
-                let kept = Unassigned { reported, held_since, answers_since, ..Unassigned::at(&at) };
-                *it = Unassigned { beside, pdo_source, upkeep, ..kept };
+                let presence = core::mem::take(&mut it.presence);
+                let Unassigned { reported, held_since, pdo_source, upkeep, .. } = *it;
+                *it = Unassigned { reported, held_since, presence, pdo_source, upkeep, ..Unassigned::at(&at) };
             }
         }
     }
@@ -90,6 +89,8 @@ impl Segment {
             let at = At { position, owners: &owners, main_count };
             let key = SubDeviceKey { station: given.station, since };
             let unassigned = Unassigned { pdo_source: given.pdo_source(), ..Unassigned::at(&at) };
+            let presence = self.subdevices.come_back(given.before).unwrap_or_default();
+            let unassigned = Unassigned { presence, ..unassigned };
             self.subdevices.add(key, Knowledge::Awaited(now), unassigned);
             effects.start(Task::ReadUnassigned { key });
         }
@@ -151,7 +152,7 @@ impl Segment {
         let round = self.attention.rounds;
         for (key, _) in unassigned.iter().filter(|(_, reading)| reading.is_answer()) {
             if let Some((_, it)) = self.subdevices.unassigned_mut(*key) {
-                it.answers_since.get_or_insert(round);
+                it.presence.since.get_or_insert(round);
             }
         }
     }
@@ -159,13 +160,8 @@ impl Segment {
     /// A member that answered no longer does. SubDevices that were known to be undeclared then are others, and so are
     /// those that had answered at their own addresses when the member did.
     pub(in crate::segment) fn tell_apart(&mut self, index: usize) {
-        let Some(answered) = self.member(index).map(|member| member.answered) else { return };
-        for (_, knowledge, it) in self.subdevices.all_unassigned_mut() {
-            let was_known = it.reported && knowledge.info().is_some();
-            let was_there = it.answers_since.is_some_and(|since| since <= answered);
-            if (was_known || was_there) && !it.beside.contains(&index) {
-                it.beside.push(index);
-            }
+        if let Some(answered) = self.member(index).map(|member| member.answered) {
+            self.subdevices.tell_apart(index, answered);
         }
     }
 
