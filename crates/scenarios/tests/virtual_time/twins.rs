@@ -242,7 +242,7 @@ fn a_spare_behind_a_hot_connect_group_does_not_join_it() {
         all.push(describe("digital-output-16", "spare"));
         all.push(describe("digital-input-16", "last"));
         let declare = |_: &Scan| {
-            let mut declaration = automatic(&infos(&["coupler", "digital-input-8", "digital-input-16"]), CYCLE);
+            let mut declaration = automatic(&infos(&base), CYCLE);
             let members = declaration.add_group(group(SubDeviceConfig::at_alias(TOOL, 0))).members;
             declaration.domains[0].members.extend(members.into_iter().map(DomainMember::new));
             declaration
@@ -253,7 +253,7 @@ fn a_spare_behind_a_hot_connect_group_does_not_join_it() {
         world.until(LIMIT, "all in OP", |world| world.application().all_settled());
         world.evaluate_latched(false);
         world.run_cycles(300);
-        let declared = vec![true, true, true, true, false, true];
+        let declared = vec![true, true, true, true, false, false];
         let mut twins = Twins { world, declared, text: format!("off for {off_ms} ms") };
         for device in [3, 3, 2, 3] {
             twins.disturb(Disturbance::Power { device, ms: off_ms });
