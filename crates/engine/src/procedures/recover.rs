@@ -153,8 +153,8 @@ const NEVER_AN_ANSWER: [AlStatusCode; 3] = [
 ];
 
 /// Another request took effect meanwhile: the SubDevice is in a state from which the requested one is not valid, has
-/// refused a request that was not the one of this procedure, or PREOP before its mailboxes were enabled (0x0016), or SAFEOP before its process
-/// data was configured (0x001D, 0x001E).
+/// refused a request that was not the one of this procedure, or PREOP before its mailboxes were enabled (0x0016), or
+/// SAFEOP before its process data was configured (0x001D, 0x001E).
 fn was_changed(error: &ConfigureError) -> bool {
     let (requested, code) = match error {
         ConfigureError::State(al_state::StateError::Left { .. }) => return true,

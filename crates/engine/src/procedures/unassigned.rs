@@ -146,8 +146,8 @@ pub(super) async fn admit_all(bus: &Bus, segment: &SharedSegment) -> bool {
 }
 
 /// Determines the positions again if a member is missing: the ring may have opened at another place since, and
-/// SubDevices of the same type are distinguished by position only. Returns what the cables show; `None` while the segment
-/// changes.
+/// SubDevices of the same type are distinguished by position only. Returns what the cables show; `None` while the
+/// segment changes.
 async fn find_places(bus: &Bus, segment: &SharedSegment) -> Option<ByCables> {
     let is_one_missed = {
         let view = segment.view();
