@@ -19,6 +19,10 @@ const LONGEST_PAUSE: Duration = Duration::from_millis(10);
 /// How long a SubDevice may take to clear its error bit after the acknowledgement.
 const ACKNOWLEDGE_LIMIT: Duration = Duration::from_millis(500);
 
+/// Consecutive readings of a state from which the requested one cannot be reached, before the wait for it ends: a write
+/// of AL control may still be in the SubDevice.
+const LEFT_READINGS: u32 = 3;
+
 /// Maximum wait for the effect of a request of a procedure that has ended.
 const PENDING_LIMIT: Duration = Duration::from_millis(500);
 /// Bytes from AL control to the end of AL status code.
@@ -51,6 +55,13 @@ pub enum StateError {
         /// The time limit.
         limit: Duration,
     },
+    /// The SubDevice is in a state from which the requested one is no valid request: another request took effect.
+    Left {
+        /// The requested state.
+        requested: AlState,
+        /// The AL status.
+        status: AlStatus,
+    },
 }
 
 impl fmt::Display for StateError {
@@ -62,6 +73,9 @@ impl fmt::Display for StateError {
             }
             StateError::Timeout { requested, status, limit } => {
                 write!(f, "expected {requested} within {} ms, AL status is {status}", limit.as_millis())
+            }
+            StateError::Left { requested, status } => {
+                write!(f, "expected {requested}, another request took effect: AL status is {status}")
             }
         }
     }
@@ -201,7 +215,7 @@ async fn request_once(
 ) -> Result<(), StateError> {
     bus.fpwr(station, map::AL_CONTROL, &AlControl::new(state).encode()).await?;
     let until = bus.now() + limit;
-    let (mut pause, mut readings) = (FIRST_PAUSE, 0_u32);
+    let (mut pause, mut readings, mut left) = (FIRST_PAUSE, 0_u32, 0_u32);
     loop {
         let (status, code) = read_status(bus, station).await?;
         if status.error {
@@ -210,6 +224,11 @@ async fn request_once(
         }
         if status.al_state() == Some(state) {
             return Ok(());
+        }
+        let is_valid = status.al_state().is_none_or(|from| transition_allowed(from, state));
+        left = if is_valid { 0 } else { left + 1 };
+        if left == LEFT_READINGS {
+            return Err(StateError::Left { requested: state, status });
         }
         if bus.now() >= until {
             return Err(StateError::Timeout { requested: state, status, limit });

@@ -79,7 +79,8 @@ pub(super) async fn keep_up(
                 segment.observe_member((index, attempt), MemberFinding::Failed(problem(&error)));
             }
             // A late request of another program, or of a procedure that has ended, took effect meanwhile.
-            Err(error) if was_changed(&error) && !core::mem::replace(&mut disturbed, true) => {
+            Err(error) if !disturbed && (was_changed(&error) || has_left(bus, segment, index, &error).await) => {
+                disturbed = true;
                 bus.sleep(READ_PAUSE).await;
                 continue;
             }
@@ -143,26 +144,42 @@ pub(super) fn is_of_bus(error: &ConfigureError) -> bool {
     }
 }
 
-/// The SubDevice has refused a state because another request took effect meanwhile: it was in another state than the
-/// preceding one (AL status code 0x0011), or PREOP was requested before its mailboxes were enabled (0x0016), or SAFEOP
-/// before its process data was configured (0x001D, 0x001E). A refusal of INIT or PREOP with one of these codes is
-/// always due to another request: INIT, and PREOP after INIT, are valid requests.
+/// AL status codes of refusals of other requests: those of a procedure are valid in the state in which it makes them,
+/// and BOOT is requested by another procedure.
+const NEVER_AN_ANSWER: [AlStatusCode; 3] = [
+    AlStatusCode::INVALID_STATE_CHANGE,
+    AlStatusCode::BOOT_NOT_SUPPORTED,
+    AlStatusCode::INVALID_MAILBOX_CONFIGURATION_BOOT,
+];
+
+/// Another request took effect meanwhile: the SubDevice is in a state from which the requested one is not valid, has
+/// refused a request that was not the one of this procedure, or PREOP before its mailboxes were enabled (0x0016), or
+/// SAFEOP before its process data was configured (0x001D, 0x001E).
 fn was_changed(error: &ConfigureError) -> bool {
-    let ConfigureError::State(al_state::StateError::Refused { requested, status, code }) = error else { return false };
-    let is_early =
-        [AlStatusCode::INVALID_OUTPUT_CONFIGURATION, AlStatusCode::INVALID_INPUT_CONFIGURATION].contains(code);
-    let before = match requested {
-        AlState::Init | AlState::PreOp => {
-            let is_mailbox = *code == AlStatusCode::INVALID_MAILBOX_CONFIGURATION_PREOP;
-            return is_early || is_mailbox || *code == AlStatusCode::INVALID_STATE_CHANGE;
-        }
-        AlState::SafeOp if is_early => return true,
-        AlState::SafeOp => AlState::PreOp,
-        AlState::Op => AlState::SafeOp,
-        AlState::Boot => return false,
+    let (requested, code) = match error {
+        ConfigureError::State(al_state::StateError::Left { .. }) => return true,
+        ConfigureError::State(al_state::StateError::Refused { requested, code, .. }) => (requested, *code),
+        _ => return false,
     };
-    let is_between = status.al_state().is_some_and(|state| state == before || state == *requested);
-    *code == AlStatusCode::INVALID_STATE_CHANGE && !is_between
+    let is_early = [AlStatusCode::INVALID_OUTPUT_CONFIGURATION, AlStatusCode::INVALID_INPUT_CONFIGURATION];
+    let is_mailbox = code == AlStatusCode::INVALID_MAILBOX_CONFIGURATION_PREOP;
+    match requested {
+        AlState::Boot => false,
+        _ if NEVER_AN_ANSWER.contains(&code) => true,
+        AlState::Init | AlState::PreOp => is_early.contains(&code) || is_mailbox,
+        AlState::SafeOp => is_early.contains(&code),
+        AlState::Op => false,
+    }
+}
+
+/// A request for its mailbox was not answered because the SubDevice is no longer in a state with mailboxes.
+async fn has_left(bus: &Bus, segment: &SharedSegment, index: usize, error: &ConfigureError) -> bool {
+    if !matches!(error, ConfigureError::Sdo(_) | ConfigureError::Startup { .. }) {
+        return false;
+    }
+    let Some(station) = segment.view().member(index).map(|member| member.station) else { return false };
+    let status = al_state::read_status(bus, station).await;
+    status.is_ok_and(|(status, _)| matches!(status.al_state(), Some(AlState::Init | AlState::Boot)))
 }
 
 /// Whether a SubDevice answers. While frames are lost this is unknown, and it counts as present.

@@ -14,7 +14,6 @@ use alloc::string::ToString;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::map;
 
 pub(super) use self::address::give;
@@ -31,7 +30,7 @@ use super::shared_segment::SharedSegment;
 use crate::info::SubDeviceInfo;
 use crate::segment::disturbance::Disturbance;
 use crate::segment::member::Phase;
-use crate::segment::unassigned::Matches;
+use crate::segment::unassigned::{ByCables, Matches};
 use crate::segment::{Observation, SubDeviceKey, Versions};
 use crate::supervisor::{Bus, BusError};
 
@@ -131,8 +130,8 @@ async fn read_once(bus: &Bus, segment: &SharedSegment, key: SubDeviceKey) -> Res
 ///
 /// False if their positions could not be determined.
 pub(super) async fn admit_all(bus: &Bus, segment: &SharedSegment) -> bool {
-    let Some(identified) = find_places(bus, segment).await else { return false };
-    let Matches { matched, held } = segment.view().match_all(&identified, bus.now());
+    let Some(by_cables) = find_places(bus, segment).await else { return false };
+    let Matches { matched, held } = segment.view().match_all(&by_cables, bus.now());
     let attempts: Vec<u32> = segment.view().members().map(|member| member.attempt).collect();
     for (key, index) in held {
         segment.observe(Observation::Held { key, index, attempt: attempts[index] });
@@ -147,15 +146,15 @@ pub(super) async fn admit_all(bus: &Bus, segment: &SharedSegment) -> bool {
 }
 
 /// Determines the positions again if a member is missing: the ring may have opened at another place since, and
-/// SubDevices of the same type are distinguished by position only. Returns the members identified by cables; `None`
-/// while the segment changes.
-async fn find_places(bus: &Bus, segment: &SharedSegment) -> Option<Vec<(StationAddress, usize)>> {
+/// SubDevices of the same type are distinguished by position only. Returns what the cables show; `None` while the
+/// segment changes.
+async fn find_places(bus: &Bus, segment: &SharedSegment) -> Option<ByCables> {
     let is_one_missed = {
         let view = segment.view();
         view.subdevices().unassigned().next().is_some() && view.members().any(|member| member.phase == Phase::Absent)
     };
     if !is_one_missed {
-        return Some(Vec::new());
+        return Some(ByCables::default());
     }
     let versions = segment.view().versions();
     let seen = view(bus).await.ok()??;
@@ -168,7 +167,7 @@ async fn find_places(bus: &Bus, segment: &SharedSegment) -> Option<Vec<(StationA
     }
     segment.observe(Observation::Places { versions, view: &seen });
     if !segment.view().needs_cables() {
-        return Some(Vec::new());
+        return Some(ByCables::default());
     }
     let ports = ports_of(bus, &seen).await.ok()??;
     let view = segment.view();

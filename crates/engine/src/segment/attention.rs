@@ -61,6 +61,8 @@ pub(super) struct Attention {
     reads: Reads,
     /// Result of the last round.
     pub round: Round,
+    /// Rounds whose results were complete.
+    pub rounds: u64,
     /// Consecutive rounds in which reads were lost though frames returned, or the reverse.
     pub blind: u8,
     /// The next evaluation if no words are posted before.
@@ -75,6 +77,7 @@ impl Default for Attention {
             next_routine: Instant::default(),
             reads: Reads::Resting(Instant::default()),
             round: Round::default(),
+            rounds: 0,
             blind: 0,
             wake: Wake::at(Instant::default()),
         }

@@ -51,6 +51,8 @@ pub struct Member {
     pub(super) mapping: u32,
     /// Consecutive rounds without an answer.
     pub(super) silent: u8,
+    /// Number of the last round in which it answered and was known to be this member; 0 before the first.
+    pub(super) answered: u64,
     /// Process data does not wait for it although it is not lost.
     pub(super) suspended: bool,
     /// The SubDevice that answers at its address while it is lost.
@@ -189,6 +191,7 @@ impl Member {
             incidents: Incidents::default(),
             mapping: 0,
             silent: 0,
+            answered: 0,
             suspended: false,
             mistaken: Mistaken::default(),
             repair: Repair::default(),

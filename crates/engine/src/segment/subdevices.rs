@@ -1,6 +1,6 @@
 //! The list of all SubDevices of the segment.
 
-use alloc::collections::BTreeMap;
+use alloc::collections::{BTreeMap, VecDeque};
 use alloc::rc::Rc;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -13,7 +13,7 @@ use super::member::{Member, MemberView};
 use super::owners::Owners;
 use super::scan::Found;
 use super::subdevice::{Role, SubDevice};
-use super::unassigned::{Unassigned, UnassignedView};
+use super::unassigned::{Presence, Unassigned, UnassignedView};
 use crate::info::SubDeviceInfo;
 
 /// The SubDevices that were found, and those that are declared and absent. A station address occurs once.
@@ -22,14 +22,19 @@ pub struct SubDevices {
     /// Declared ones come first, by their indices in the declaration.
     all: Vec<SubDevice>,
     declared: usize,
+    /// Those without a declaration that no longer answer, the last ones.
+    departed: VecDeque<(StationAddress, Presence)>,
 }
+
+/// Maximum number of SubDevices that are known to have left: more than stand behind one cable as a rule.
+const MAX_DEPARTED: usize = 64;
 
 impl SubDevices {
     /// Declared SubDevices by their indices in the declaration, and those without a declaration.
     pub fn new(declared: Vec<SubDevice>, undeclared: impl IntoIterator<Item = SubDevice>) -> SubDevices {
         let (count, mut all) = (declared.len(), declared);
         all.extend(undeclared);
-        SubDevices { all, declared: count }
+        SubDevices { all, declared: count, departed: VecDeque::new() }
     }
 
     /// The SubDevices of a scan, without any declaration.
@@ -158,6 +163,35 @@ impl SubDevices {
     /// An unassigned SubDevice was found.
     pub(super) fn add(&mut self, key: SubDeviceKey, knowledge: Knowledge, unassigned: Unassigned) {
         self.all.push(SubDevice { key, knowledge, role: Role::Unassigned(unassigned) });
+    }
+
+    /// Unassigned SubDevices no longer answer. They keep their addresses as long as they have power.
+    pub(super) fn depart(&mut self, keys: impl Fn(SubDeviceKey) -> bool) {
+        let mut left = Vec::new();
+        for (key, _, it) in self.all_unassigned_mut().filter(|(key, ..)| keys(*key)) {
+            left.push((key.station, core::mem::take(&mut it.presence)));
+        }
+        self.departed.extend(left);
+        let above = self.departed.len().saturating_sub(MAX_DEPARTED);
+        self.departed.drain(..above);
+        self.remove(keys);
+    }
+
+    /// What is known of a SubDevice that had left and has the same address still.
+    pub(super) fn come_back(&mut self, station: StationAddress) -> Option<Presence> {
+        let at = self.departed.iter().position(|(departed, _)| *departed == station)?;
+        self.departed.remove(at).map(|(_, presence)| presence)
+    }
+
+    /// A member has left that had answered in this round. Those without a declaration that were there are others.
+    pub(super) fn tell_apart(&mut self, index: usize, answered: u64) {
+        self.departed.iter_mut().for_each(|(_, presence)| presence.tell_apart(index, answered));
+        for (_, knowledge, it) in self.all_unassigned_mut() {
+            if it.reported && knowledge.info().is_some() {
+                it.presence.is_beside(index);
+            }
+            it.presence.tell_apart(index, answered);
+        }
     }
 
     /// Unassigned SubDevices have left, or lost their addresses.

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use core::ops::Deref;
 use core::time::Duration;
 
-use ringcat_wire::address::Position;
+use ringcat_wire::address::{Position, StationAddress};
 
 use super::key::SubDeviceKey;
 use super::knowledge::Knowledge;
@@ -17,6 +17,36 @@ use crate::time::Instant;
 
 /// Maximum wait for a SubDevice that is being read, before the others of the gap are matched.
 pub(super) const HOLD: Duration = Duration::from_secs(1);
+
+/// Members beside which a SubDevice without a declaration was there: it is none of these, whatever its identity is.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Presence {
+    /// Number of the first round in which it answered.
+    pub since: Option<u64>,
+    /// Members that answered while it was there, or was known to be none of them, and have left since.
+    beside: Vec<usize>,
+}
+
+impl Presence {
+    /// A member has left that had answered in this round.
+    pub fn tell_apart(&mut self, index: usize, answered: u64) {
+        if self.since.is_some_and(|since| since <= answered) {
+            self.is_beside(index);
+        }
+    }
+
+    /// It was there beside a member.
+    pub fn is_beside(&mut self, index: usize) {
+        if !self.beside.contains(&index) {
+            self.beside.push(index);
+        }
+    }
+
+    /// Whether it was there beside a member.
+    pub fn was_beside(&self, index: usize) -> bool {
+        self.beside.contains(&index)
+    }
+}
 
 /// The state of a SubDevice that is not matched with a declaration.
 #[derive(Clone, Debug)]
@@ -33,8 +63,8 @@ pub struct Unassigned {
     pub reported: bool,
     /// Since this time several members are possible.
     pub(super) held_since: Option<Instant>,
-    /// Members that were lost after it was known to be undeclared: it is none of these, whatever its identity is.
-    pub(super) beside: Vec<usize>,
+    /// Members beside which it was there.
+    pub(super) presence: Presence,
     /// Where the PDOs of its SII are known from when it is read.
     pub(super) pdo_source: PdoSource,
     /// Its requested state and the attempts to reach it; `None` without a request.
@@ -61,7 +91,7 @@ impl Unassigned {
             from_main: at.position < at.main_count,
             reported: false,
             held_since: None,
-            beside: Vec::new(),
+            presence: Presence::default(),
             pdo_source: PdoSource::Outdated,
             upkeep: None,
         }
@@ -109,6 +139,15 @@ impl UnassignedView<'_> {
     pub(super) fn is_awaited(&self, now: Instant) -> bool {
         matches!(self.knowledge, Knowledge::Awaited(since) if now.since(*since) < HOLD)
     }
+}
+
+/// What the cables show of unassigned SubDevices.
+#[derive(Clone, Debug, Default)]
+pub struct ByCables {
+    /// SubDevices that are members.
+    pub members: Vec<(StationAddress, usize)>,
+    /// SubDevices at the places of those that were there without a declaration.
+    pub others: Vec<StationAddress>,
 }
 
 /// Unassigned SubDevices identified as members.

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use ringcat::{ClockConfig, ClockDatagrams, Event, Options, PulseGrid, ReferenceClock, SubDeviceId, SyncSignals};
 use ringcat_sim::cable::DeviceIndex;
+use ringcat_sim::controller::Wander;
 use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::network::{Network, NetworkOptions};
 use ringcat_wire::register::map;
@@ -12,6 +13,10 @@ use scenarios::pulses::Pulses;
 use scenarios::segments::{line, ring};
 use scenarios::world::World;
 
+/// DC_SYSTEM_TIME_DIFFERENCE: bit 31 is the sign.
+const DIFFERENCE: ringcat_wire::address::RegisterAddress = map::DC_SYSTEM_TIME_DIFFERENCE;
+/// Change of a clock's rate to either side, with a period of 50 ms: some microseconds.
+const SWING_PPM: i64 = 300;
 /// Cycle of SYNC0 and of the application.
 const CYCLE_NS: u64 = 1_000_000;
 /// Seconds from 2000 to 2026, as CLOCK_REALTIME differs from CLOCK_MONOTONIC.
@@ -440,4 +445,50 @@ fn a_subdevice_with_an_unlocked_clock_continues_after_5_s_with_one_warning() {
     let of_last = |event: &Event| matches!(event, Event::WentOnUnlocked { subdevice: SubDeviceId(3), .. });
     let count = world.events(mark).iter().filter(|timed| of_last(&timed.event)).count();
     assert_eq!(count, 1, "{:?}", world.events(mark));
+}
+
+/// The limit of IgH is 10 us: a clock that stays within it, but not within 300 ns, counts as locked, and one beyond is
+/// a warning. Differences are read inside the SubDevice.
+// covers: 7.2, 7.3, dc-lock
+#[test]
+fn a_clock_within_10_us_counts_as_locked_with_the_choices_of_igh() {
+    let swing = |ppm| Wander { amplitude_ppb: ppm * 1_000, period: Duration::from_millis(50) };
+    for (kind, ppm, is_within) in [("line", SWING_PPM, true), ("ring", SWING_PPM, true), ("line", 900, false)] {
+        for as_igh in [true, false] {
+            let mut descriptions = clocked(4, 0);
+            match is_within {
+                true => descriptions[3].clock_wander = swing(ppm),
+                false => descriptions[3].clock_drift_ppb = ppm * 1_000,
+            }
+            let choice = if as_igh { config().as_igh() } else { config().with_lock_window_ns(300) };
+            let mut world = World::with(48, wired_as(kind, descriptions), &Options::default(), |scan| {
+                let mut declaration = with_clocks(scan, choice);
+                declaration.subdevices.iter_mut().for_each(|it| it.sync = Some(SyncSignals::sync0(CYCLE_NS as u32, 0)));
+                declaration
+            })
+            .expect("it can be activated");
+            let mut worst = Vec::new();
+            for _ in 0..if is_within { 30 } else { 65 } {
+                let mut most = 0;
+                for _ in 0..100 {
+                    world.run_cycles(1);
+                    let register = world.network().device(DeviceIndex(3)).controller.register(DIFFERENCE, 4);
+                    let bytes = [register[0], register[1], register[2], register[3]];
+                    most = most.max(u32::from_le_bytes(bytes) & 0x7FFF_FFFF);
+                }
+                worst.push(most);
+            }
+            let text = format!("{kind}, {ppm} ppm, as IgH {as_igh}: {worst:?} ns");
+            println!("{text}");
+            let settled = &worst[5..];
+            assert!(
+                settled.iter().all(|ns| if is_within { (300..10_000).contains(ns) } else { *ns > 10_000 }),
+                "{text}"
+            );
+            let warned = world.saw(world.beginning(), |event| matches!(event, Event::WentOnUnlocked { .. }));
+            assert_eq!(warned, as_igh && !is_within, "{text}");
+            assert_eq!(world.all_in_op(), as_igh, "{text}");
+            assert_eq!(world.application().engine().clocks_locked(), as_igh && is_within, "{text}");
+        }
+    }
 }

@@ -4,8 +4,8 @@
 use std::time::Duration;
 
 use ringcat::{
-    Application, ClockConfig, Declaration, DomainId, Error, Event, LastOutputs, Links, MainDevice, Options, Position,
-    Retries, Scan, Services, StopError, SubDeviceConfig, SubDeviceId, SubDeviceState, automatic,
+    Application, ClockConfig, Declaration, DomainId, Error, Event, LastOutputs, Link, Links, MainDevice, Options,
+    Position, Retries, Scan, Services, StopError, SubDeviceConfig, SubDeviceId, SubDeviceState, automatic,
 };
 use ringcat_sim::cable::{CableId, DeviceIndex};
 use ringcat_sim::fault::Fault;
@@ -19,8 +19,14 @@ use scenarios::witness::Witness;
 use scenarios::world::CYCLE;
 
 const LIMIT: Duration = Duration::from_secs(1);
-/// Beside the state changes with clocks, which are known; the lock of the clocks is not awaited.
-const WITH_CLOCKS: Duration = Duration::from_millis(15);
+/// All of an activation after a deactivation but the state changes.
+const BESIDE_CHANGES: Duration = Duration::from_millis(10);
+/// The set-up of clocks that are known: one latched frame shows that the segment is the same, another gives the times
+/// for the offsets, then offsets, delays and filters of all are written. It needs one cycle more than the
+/// configuration beside it; the lock of the clocks is not awaited.
+const CLOCK_SET_UP: Duration = CYCLE;
+/// DC_SYSTEM_TIME_OFFSET to DC_SPEED_COUNTER_DIFFERENCE and the filters.
+const CLOCK_SET_UP_REGISTERS: std::ops::Range<u16> = 0x0920..0x0936;
 /// Two with a mailbox, two with device emulation, two with neither.
 const MIXED: [&str; 6] =
     ["servo", "digital-output-8", "emulated-output-8", "servo", "emulated-input-8", "digital-input-8"];
@@ -167,7 +173,11 @@ fn activation_after_deactivation_of_100_takes_the_state_changes_and_10_ms() {
         let sent = frames.sent();
         let touched = sent.iter().filter(|(_, _, register)| SII_INTERFACE.contains(register)).count();
         assert_eq!((touched, sent.len() > 1_000), (0, true), "{what}");
-        let limit = changes + if clocks { WITH_CLOCKS } else { Duration::from_millis(10) };
+        // One wait more: the clocks are set up before SubDevices that have one may go to OP.
+        let in_set_up = |(_, _, register): &&(Link, u8, u16)| CLOCK_SET_UP_REGISTERS.contains(register);
+        let written = sent.iter().filter(in_set_up).count();
+        assert_eq!(written > 100, clocks, "{what}: {written} datagrams of a clock set-up");
+        let limit = changes + BESIDE_CHANGES + if clocks { CLOCK_SET_UP } else { Duration::ZERO };
         assert!(activation <= limit, "{what}: {activation:?}");
         let all = application.links().links().network().devices();
         assert!(all.into_iter().all(|device| device.al_status() == AlStatus::new(AlState::Op)), "{what}");

@@ -1,6 +1,7 @@
 //! Operation without an application, and of SubDevices without a declaration beside one: the MainDevice scans by
 //! itself, follows changes, and keeps all in PREOP with their mailboxes.
 
+mod beside;
 mod dictionaries;
 mod foreign;
 mod live;

@@ -1,6 +1,8 @@
 //! Services for a tool: ports of all SubDevices, urgent register writes, forced states, owners of EEPROMs, clients of
 //! events.
 
+mod latched;
+
 use std::time::Duration;
 
 use ringcat::{

@@ -7,8 +7,10 @@ use ringcat::{
     automatic,
 };
 use ringcat_sim::cable::{CableId, DeviceIndex};
+use ringcat_sim::fault::Fault;
 use ringcat_sim::network::NetworkOptions;
-use scenarios::segments::{descriptions, ring};
+use scenarios::dice::Dice;
+use scenarios::segments::{descriptions, line, ring};
 use scenarios::tap::Tap;
 use scenarios::world::{CYCLE, World};
 
@@ -235,5 +237,87 @@ fn the_end_of_an_application_numbers_the_events_of_its_cycles() {
         let expected = raised.min(QUEUE)..=(raised + 1).min(QUEUE);
         assert!(expected.contains(&of_domains(&since)), "{} of {raised}", of_domains(&since));
         assert!(main_device.engine().events_dropped() >= dropped);
+    }
+}
+
+/// Without an application: at each time of random scenarios the snapshot has as many SubDevices as the events up to its
+/// number say, each with an address and a position of its own, and those that are there in the end.
+// covers: jobs
+#[test]
+fn snapshots_of_undeclared_subdevices_and_numbered_events_agree_at_all_times() {
+    for seed in 0..12 {
+        let mut dice = Dice::new(seed);
+        let size = 2 + dice.below(6) as usize;
+        let kinds: Vec<&str> = (0..size).map(|_| *dice.pick(&KINDS)).collect();
+        let is_ring = dice.one_in(2);
+        let build = if is_ring { ring } else { line };
+        let network = build(descriptions(&kinds), NetworkOptions::default());
+        let mut main_device = MainDevice::request(Tap::new(network), &Options::default().with_idle_operation(true));
+        let mut known = Known { next: 0, count: 0 };
+        let mut text = format!("seed {seed}, {kinds:?}, ring {is_ring}");
+        let attend = |main_device: &mut MainDevice<Tap>, known: &mut Known, ms: u64, text: &str| {
+            for _ in 0..ms * 4 {
+                main_device.attend(Duration::from_micros(250));
+                known.follow(main_device, text);
+            }
+        };
+        attend(&mut main_device, &mut known, 500, &text);
+        assert_eq!(known.count, size, "{text}");
+        for _ in 0..6 {
+            let ms = *dice.pick(&[1, 4, 30, 120, 700]);
+            let device = DeviceIndex(dice.below(size as u64) as usize);
+            let cable = CableId(dice.below(size as u64) as usize);
+            let (fault, undo) = match dice.below(2) {
+                0 => (Fault::PowerOff(device), Fault::PowerOn(device)),
+                _ => (Fault::Cut(cable), Fault::Heal(cable)),
+            };
+            text = format!("{text}\n  {fault:?} for {ms} ms");
+            main_device.links_mut().network_mut().apply(fault);
+            attend(&mut main_device, &mut known, ms, &text);
+            main_device.links_mut().network_mut().apply(undo);
+            let pause = *dice.pick(&[1, 30, 150, 900]);
+            attend(&mut main_device, &mut known, pause, &text);
+        }
+        attend(&mut main_device, &mut known, 3_000, &text);
+        let state = main_device.engine_mut().snapshot();
+        let network = main_device.links_mut().network();
+        assert_eq!((known.count, state.subdevices.len()), (size, size), "{text}");
+        for (at, it) in state.subdevices.iter().enumerate() {
+            let device = network.device(DeviceIndex(at));
+            let station = device.controller.register(ringcat_wire::register::map::STATION_ADDRESS, 2);
+            assert_eq!((it.position, it.declared), (Some(at as u16), None), "{text}");
+            assert_eq!(it.station.to_le_bytes(), station, "{text}");
+            assert_eq!(it.identity[1], scenarios::segments::describe(kinds[at], "x").identity.product_code, "{text}");
+        }
+    }
+}
+
+/// What the numbered events have said so far of a segment without an application.
+struct Known {
+    next: u64,
+    count: usize,
+}
+
+impl Known {
+    fn follow(&mut self, main_device: &mut MainDevice<Tap>, text: &str) {
+        let state = main_device.engine_mut().snapshot();
+        let since = main_device.engine_mut().events_since(self.next);
+        assert_eq!((since.missed, since.next), (0, state.next_event), "{text}");
+        self.next = since.next;
+        for timed in &since.events {
+            self.count = match timed.event {
+                Event::SegmentChanged { subdevices, .. } | Event::ScanFinished { subdevices } => subdevices,
+                _ => self.count,
+            };
+        }
+        let events: Vec<&Event> = since.events.iter().map(|timed| &timed.event).collect();
+        assert_eq!(state.subdevices.len(), self.count, "{text}\n{:?} {events:?}", main_device.now());
+        let mut positions: Vec<_> = state.subdevices.iter().map(|it| it.position).collect();
+        let mut stations: Vec<_> = state.subdevices.iter().map(|it| it.station).collect();
+        positions.sort_unstable();
+        stations.sort_unstable();
+        positions.dedup();
+        stations.dedup();
+        assert_eq!((positions.len(), stations.len()), (self.count, self.count), "{text}: {state:?}");
     }
 }

@@ -9,7 +9,7 @@ use crate::segment::unassigned::UnassignedView;
 pub(super) fn fit(segment: &Segment, it: UnassignedView<'_>, index: usize) -> Fit {
     let Some(member) = segment.member(index) else { return Fit::No };
     let Some(info) = it.knowledge.info() else { return Fit::Unreadable };
-    if it.beside.contains(&index) {
+    if it.presence.was_beside(index) {
         return Fit::No;
     }
     let identity = &info.identity;

@@ -3,8 +3,6 @@
 use alloc::format;
 use alloc::vec::Vec;
 
-use ringcat_wire::address::StationAddress;
-
 use super::fit::fit;
 use super::group_matching;
 use crate::config::IdentityMismatch;
@@ -17,22 +15,26 @@ use crate::segment::key::SubDeviceKey;
 use crate::segment::matching::{Fit, assign};
 use crate::segment::model::Segment;
 use crate::segment::order::ranks;
-use crate::segment::unassigned::{HOLD, Matches, UnassignedView};
+use crate::segment::unassigned::{ByCables, HOLD, Matches, UnassignedView};
 use crate::time::Instant;
 
 impl Segment {
     /// Matches all unassigned SubDevices with absent members. To be called when it is known of all members whether they
     /// are present: otherwise a SubDevice might be taken for another member of the same type. `identified`: matches
     /// proven by cables.
-    pub fn match_all(&self, identified: &[(StationAddress, usize)], now: Instant) -> Matches {
+    pub fn match_all(&self, by_cables: &ByCables, now: Instant) -> Matches {
+        let identified = &by_cables.members[..];
         let mut unassigned: Vec<UnassignedView<'_>> = self.subdevices.unassigned().collect();
         unassigned.put_in_order_by_key(|it| it.position);
         let of_groups = group_matching::members(self, &mut unassigned, now);
         let by_cable = |it: &UnassignedView<'_>| identified.iter().find(|(station, _)| *station == it.key.station);
-        let by_cables = unassigned.iter().filter_map(|it| Some((*it, by_cable(it)?.1)));
-        let sure = of_groups.into_iter().chain(by_cables).map(|(it, index)| (it.key, Some(index)));
+        let connected = unassigned.iter().filter_map(|it| Some((*it, by_cable(it)?.1)));
+        let sure = of_groups.into_iter().chain(connected).map(|(it, index)| (it.key, Some(index)));
         let mut matched: Vec<(SubDeviceKey, Option<usize>)> = sure.collect();
         unassigned.retain(|it| by_cable(it).is_none());
+        let is_other = |it: &UnassignedView<'_>| by_cables.others.contains(&it.key.station) && self.has_a_place(*it);
+        matched.extend(unassigned.iter().filter(|it| is_other(it)).map(|it| (it.key, None)));
+        unassigned.retain(|it| !is_other(it));
         let mut held = Vec::new();
         for gap in unassigned.chunk_by(|one, other| one.between == other.between) {
             if gap.iter().any(|it| it.is_awaited(now)) {
@@ -51,6 +53,15 @@ impl Segment {
             }
         }
         Matches { matched, held }
+    }
+
+    /// All absent members that it may be were at places of their own, and none has its serial number.
+    fn has_a_place(&self, it: UnassignedView<'_>) -> bool {
+        self.absent().all(|index| match fit(self, it, index) {
+            Fit::No | Fit::Unreadable => true,
+            Fit::Seen => self.member(index).is_some_and(|member| member.node.is_some()),
+            Fit::NeverSeen | Fit::Serial => false,
+        })
     }
 
     /// Another absent member matches as well: there are several members of the type, no serial number, and fewer

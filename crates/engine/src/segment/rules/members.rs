@@ -58,13 +58,15 @@ impl Segment {
         self.attention.blind = if is_blind { self.attention.blind.saturating_add(1) } else { 0 };
         self.attention.round.is_blind = self.attention.blind == BLIND_ROUNDS;
         let Some(counted) = counted else { return };
+        self.attention.rounds += 1;
+        self.observe_others(unassigned);
         let others = unassigned.iter().filter(|(_, reading)| reading.is_answer()).count();
         let (counted, answering) = (usize::from(counted.0), answers(readings) + others);
         // If the count agrees with the answers, a silent SubDevice is certainly absent.
         let needed = if counted == answering { 1 } else { SILENT_READS };
         let is_certain = self.evaluate(readings, before, needed, now, effects);
         if needed == 1 {
-            self.subdevices.remove(|key| unassigned.contains(&(key, Reading::Silent)));
+            self.subdevices.depart(|key| unassigned.contains(&(key, Reading::Silent)));
         }
         if !is_certain {
             // One quick repetition, and then the next round only when something changes.
@@ -116,6 +118,9 @@ impl Segment {
                 }
                 (Reading::Answer { status, code, .. }, phase) => {
                     member.silent = 0;
+                    if matches!(phase, Phase::Settled(_)) {
+                        member.answered = self.attention.rounds;
+                    }
                     self.observe_answer(index, phase, (*status, *code), now, effects);
                 }
             }
@@ -239,6 +244,7 @@ impl Segment {
         now: Instant,
         effects: &mut Effects,
     ) {
+        let rounds = self.attention.rounds;
         let Some(member) = self.current(index, attempt) else { return };
         match finding {
             MemberFinding::Reached(state) => self.settle(index, state, effects),
@@ -246,6 +252,7 @@ impl Segment {
                 // It may be another SubDevice of the same type.
                 member.oddities = Default::default();
                 member.mistaken = Mistaken::default();
+                member.answered = rounds;
                 self.post_presence(index);
                 effects.report(Event::Returned { subdevice: SubDeviceId(index) });
             }

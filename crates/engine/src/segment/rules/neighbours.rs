@@ -18,7 +18,7 @@ use crate::segment::knowledge::Knowledge;
 use crate::segment::matching::Fit;
 use crate::segment::member::Phase;
 use crate::segment::model::Segment;
-use crate::segment::unassigned::UnassignedView;
+use crate::segment::unassigned::{ByCables, UnassignedView};
 use crate::segment::view::View;
 use crate::topology::{Closing, Finding, NodeStatus, PortOf, Topology};
 
@@ -26,21 +26,24 @@ use crate::topology::{Closing, Finding, NodeStatus, PortOf, Topology};
 type End = Option<PortOf>;
 
 impl Segment {
-    /// An unassigned SubDevice matches several absent members, or one of them without proof by order: then ports have
-    /// to be read ([`Segment::identified_by_cables`]).
+    /// An unassigned SubDevice matches several absent members, or one of them without proof by order, or there were
+    /// others without a declaration: then ports have to be read ([`Segment::identified_by_cables`]).
     pub fn needs_cables(&self) -> bool {
+        let places = self.members().filter(|member| member.node.is_some()).count();
+        let had_others = self.cabling.topology.nodes.len() > places;
         self.subdevices.unassigned().any(|it| {
             let fits: Vec<usize> = self.absent().filter(|index| self.may_be(it, *index)).collect();
             match fits[..] {
                 [] => false,
-                [only] => !self.is_between(it, only),
+                [only] => had_others || !self.is_between(it, only),
                 _ => true,
             }
         })
     }
 
-    /// Unassigned SubDevices with the members that they are, as far as the cables show. `ports` by position.
-    pub fn identified_by_cables(&self, view: &View, ports: &[DlStatus]) -> Vec<(StationAddress, usize)> {
+    /// The members that unassigned SubDevices are, and those that are none, as far as the cables show. `ports` by
+    /// position.
+    pub fn identified_by_cables(&self, view: &View, ports: &[DlStatus]) -> ByCables {
         let owners = self.owners(&view.stations);
         let owners: Vec<Option<usize>> = (0..view.stations.len()).map(|at| owners.at(at)).collect();
         Present { segment: self, view, nodes: self.nodes(view, ports) }.identified(owners)
@@ -95,56 +98,75 @@ impl Present<'_> {
         (self.segment.absent().any(|it| it == index) && self.segment.may_be(unassigned, index)).then_some(index)
     }
 
-    fn identified(&self, mut members: Vec<Option<usize>>) -> Vec<(StationAddress, usize)> {
-        let count = members.len();
+    fn identified(&self, mut members: Vec<Option<usize>>) -> ByCables {
+        let mut result = ByCables::default();
         if self.is_as_before(&members) {
-            let unassigned = (0..count).filter(|at| members[*at].is_none());
-            return unassigned.filter_map(|at| Some((self.view.stations[at], self.candidate(at, at)?))).collect();
+            for at in (0..members.len()).filter(|at| members[*at].is_none()) {
+                match self.candidate(at, at) {
+                    Some(index) => result.members.push((self.view.stations[at], index)),
+                    None if self.is_of_others(at) => result.others.push(self.view.stations[at]),
+                    None => {}
+                }
+            }
+            return result;
         }
         let before = &self.segment.cabling.topology;
         let now = self.topology(&members);
         // In a closed ring with crossed SubDevices neighbours are an assumption.
         if before.is_assumed() || now.is_assumed() {
-            return Vec::new();
+            return result;
         }
         let (before, now) = (ends(before), self.ends(&now));
-        let mut identified = Vec::new();
         loop {
-            let found = self.next_to(&members, &before, &now);
+            let places = self.next_to(&members, &before, &now);
+            let there = |(at, node): &(usize, usize)| Some((*at, self.candidate(*node, *at)?));
+            let mut found: Vec<(usize, usize)> = places.iter().filter_map(there).collect();
+            found.retain(|(_, index)| !members.contains(&Some(*index)));
             let is_sure = |(at, index): &(usize, usize)| {
                 found.iter().filter(|(other, member)| other == at || member == index).count() == 1
             };
             let sure: Vec<(usize, usize)> = found.iter().copied().filter(is_sure).collect();
             if sure.is_empty() {
-                return identified;
+                let others = places.iter().filter(|(_, node)| self.is_of_others(*node));
+                result.others = others.map(|(at, _)| self.view.stations[*at]).collect();
+                return result;
             }
             for (at, index) in sure {
                 members[at] = Some(index);
-                identified.push((self.view.stations[at], index));
+                result.members.push((self.view.stations[at], index));
             }
         }
     }
 
-    /// Unassigned SubDevices next to members, by position, with the member that was there.
+    /// A SubDevice without a declaration was at this place.
+    fn is_of_others(&self, node: usize) -> bool {
+        self.segment.subdevices.member_at(node).is_none()
+    }
+
+    /// Unassigned SubDevices next to members, by position, with the place of before that they are at.
     fn next_to(&self, members: &[Option<usize>], before: &[[End; 2]], now: &[[End; 2]]) -> Vec<(usize, usize)> {
         let mut found = Vec::new();
         for (near, far) in now.iter().flat_map(|[one, other]| [(*one, *other), (*other, *one)]) {
             let Some(far) = far.filter(|far| members[far.node].is_none()) else { continue };
             let Some(then) = self.place_before(members, near) else { continue };
             let Some(other) = opposite(before, then).filter(|other| other.port == far.port) else { continue };
-            if let Some(index) = self.candidate(other.node, far.node).filter(|it| !members.contains(&Some(*it))) {
-                found.push((far.node, index));
-            }
+            found.push((far.node, other.node));
         }
         found.put_in_order();
         found.dedup();
         found
     }
 
-    /// An end of a cable in the previous cabling, if the SubDevice there is known.
+    /// An end of a cable in the previous cabling, if the SubDevice there is known: a member, or one without a
+    /// declaration that has kept its address.
     fn place_before(&self, members: &[Option<usize>], end: End) -> Option<End> {
         let Some(PortOf { node, port }) = end else { return Some(None) };
-        let node = self.segment.member(members[node]?)?.node?;
+        let kept = || {
+            let station = self.unassigned_at(node)?.key.station;
+            let place = self.segment.cabling.stations.iter().position(|other| *other == station)?;
+            self.is_of_others(place).then_some(place)
+        };
+        let node = members[node].map_or_else(kept, |index| self.segment.member(index)?.node)?;
         Some(Some(PortOf { node, port }))
     }
 

@@ -16,6 +16,7 @@ use crate::segment::knowledge::Knowledge;
 use crate::segment::model::Segment;
 use crate::segment::order::owners_of;
 use crate::segment::owners::Owners;
+use crate::segment::reading::Reading;
 use crate::segment::setup::Setup;
 use crate::segment::start::Start;
 use crate::segment::unassigned::{At, Unassigned};
@@ -59,9 +60,9 @@ impl Segment {
         for (key, _, it) in self.subdevices.all_unassigned_mut() {
             if let Some(position) = view.position(key.station) {
                 let at = At { position, owners: &owners, main_count };
-                let beside = core::mem::take(&mut it.beside);
+                let presence = core::mem::take(&mut it.presence);
                 let Unassigned { reported, held_since, pdo_source, upkeep, .. } = *it;
-                *it = Unassigned { reported, held_since, beside, pdo_source, upkeep, ..Unassigned::at(&at) };
+                *it = Unassigned { reported, held_since, presence, pdo_source, upkeep, ..Unassigned::at(&at) };
             }
         }
     }
@@ -88,6 +89,8 @@ impl Segment {
             let at = At { position, owners: &owners, main_count };
             let key = SubDeviceKey { station: given.station, since };
             let unassigned = Unassigned { pdo_source: given.pdo_source(), ..Unassigned::at(&at) };
+            let presence = self.subdevices.come_back(given.before).unwrap_or_default();
+            let unassigned = Unassigned { presence, ..unassigned };
             self.subdevices.add(key, Knowledge::Awaited(now), unassigned);
             effects.start(Task::ReadUnassigned { key });
         }
@@ -144,12 +147,21 @@ impl Segment {
         }
     }
 
-    /// A member no longer answers. SubDevices that are known to be undeclared at this time are not this member.
-    pub(in crate::segment) fn tell_apart(&mut self, index: usize) {
-        for (_, knowledge, it) in self.subdevices.all_unassigned_mut() {
-            if it.reported && knowledge.info().is_some() && !it.beside.contains(&index) {
-                it.beside.push(index);
+    /// SubDevices without a declaration were read in a round, before the members.
+    pub(in crate::segment) fn observe_others(&mut self, unassigned: &[(SubDeviceKey, Reading)]) {
+        let round = self.attention.rounds;
+        for (key, _) in unassigned.iter().filter(|(_, reading)| reading.is_answer()) {
+            if let Some((_, it)) = self.subdevices.unassigned_mut(*key) {
+                it.presence.since.get_or_insert(round);
             }
+        }
+    }
+
+    /// A member that answered no longer does. SubDevices that were known to be undeclared then are others, and so are
+    /// those that had answered at their own addresses when the member did.
+    pub(in crate::segment) fn tell_apart(&mut self, index: usize) {
+        if let Some(answered) = self.member(index).map(|member| member.answered) {
+            self.subdevices.tell_apart(index, answered);
         }
     }
 
@@ -198,7 +210,7 @@ impl Segment {
         let Some(member) = self.subdevices.member_mut(index) else { return };
         let Ok(setup) = Setup::new(index, &member.config, &info, &self.layout) else { return };
         member.take_setup(index, setup, effects);
-        member.configured = false;
+        (member.configured, member.answered) = (false, self.attention.rounds);
         self.subdevices.identify(index, info);
         self.tell_scan_of_member(index);
         self.subdevices.remove(|other| other == key);

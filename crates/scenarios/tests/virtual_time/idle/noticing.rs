@@ -70,6 +70,53 @@ fn changes_among_100_are_noticed_within_100_ms() {
     println!("100 SubDevices: a change is noticed within {slowest:?}");
 }
 
+// covers: states
+#[test]
+fn cut_cables_and_unplugged_links_among_100_are_noticed_within_100_ms() {
+    let mut dice = Dice::new(71);
+    let mut slowest = Duration::ZERO;
+    for (number, network) in hundred().into_iter().enumerate() {
+        let is_ring = number == 1;
+        let mut main_device = settled(network);
+        let mut note = |time: Duration, what: &str| {
+            assert!(time < NOTICED, "{what}, ring {is_ring}: {time:?}");
+            slowest = slowest.max(time);
+        };
+        let inner = (0..8).map(|_| 1 + dice.below(COUNT as u64 - 1) as usize);
+        let mut cables: Vec<usize> = inner.chain([0, 0]).collect();
+        cables.extend(is_ring.then_some([COUNT; 2]).into_iter().flatten());
+        for cable in cables {
+            let is_link = cable == 0 || cable == COUNT;
+            any_moment(&mut main_device, &mut dice);
+            apply(&mut main_device, Fault::Cut(CableId(cable)));
+            let is_cut = |event: &Event| match event {
+                Event::LinkDown { .. } => is_link,
+                Event::RingOpened { .. } => is_ring,
+                Event::Counted { .. } => !is_ring,
+                _ => false,
+            };
+            note(noticed(&mut main_device, is_cut), &format!("cut of cable {cable}"));
+            any_moment_after(&mut main_device, &mut dice);
+            let reachable = if is_ring { COUNT } else { cable };
+            assert_eq!(main_device.subdevices().len(), reachable, "cable {cable}");
+            any_moment(&mut main_device, &mut dice);
+            apply(&mut main_device, Fault::Heal(CableId(cable)));
+            let is_healed = |event: &Event| match event {
+                Event::LinkUp { .. } => is_link,
+                Event::RingClosed { .. } => is_ring,
+                Event::Counted { .. } => !is_ring,
+                _ => false,
+            };
+            note(noticed(&mut main_device, is_healed), &format!("cable {cable} again"));
+            main_device.attend(Duration::from_secs(2));
+            any_moment_after(&mut main_device, &mut dice);
+            assert_eq!(main_device.subdevices().len(), COUNT, "cable {cable}");
+            assert!(statuses(&mut main_device).iter().all(|status| *status == PREOP), "cable {cable}");
+        }
+    }
+    println!("100 SubDevices: a cut cable or an unplugged link is noticed within {slowest:?}");
+}
+
 /// Follows a change, and waits for any moment of a period.
 fn any_moment_after(main_device: &mut MainDevice<Tap>, dice: &mut Dice) {
     main_device.attend(Duration::from_secs(1) + Duration::from_micros(dice.below(100_000)));
