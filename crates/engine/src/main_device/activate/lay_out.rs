@@ -7,7 +7,9 @@ use super::activate_error::ActivateError;
 use super::lrw::{self, check_lrw};
 use super::prepare::{domain_specs, witnesses};
 use crate::info::SubDeviceInfo;
-use crate::layout::{DomainSpec, Layout, LrwPolicy, Rules};
+#[cfg(feature = "standby")]
+use crate::layout::LrwPolicy;
+use crate::layout::{DomainSpec, Layout, Rules};
 use crate::main_device::declaration::Declaration;
 use crate::main_device::declaration::areas::Areas;
 
