@@ -11,6 +11,9 @@ use ringcat::{Application, Instant, SupervisorThread};
 use crate::any_links::AnyLinks;
 use crate::code::{Code, Outcome};
 
+/// No frame is waited for as long as this.
+const LONGEST_WAIT: Duration = Duration::from_secs(10);
+
 /// The application of a handle.
 type App = Application<AnyLinks, SupervisorThread>;
 
@@ -121,7 +124,9 @@ impl Active {
     /// is waited for.
     pub fn receive_again_in(&self) -> Option<Duration> {
         let at = self.application.receive_again_at();
-        (at != Instant::NEVER).then(|| at.since(self.application.now()))
+        let rest = (at != Instant::NEVER).then(|| at.since(self.application.now()));
+        // Before the ways of frames are known the time is far away.
+        rest.filter(|rest| *rest < LONGEST_WAIT)
     }
 
     /// The next call of send distributes time.

@@ -44,7 +44,8 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
 
     /// Sets the expected time from one [`Application::send`] to the next, for an application with its own loop. Frames
     /// that are sent again must be back before the next send, and the acyclic half keeps the wire free for it. Without
-    /// this it is the shortest period of the domains, or 1 ms if none has a period.
+    /// this it is the shortest period of the domains, or 1 ms if none has a period. Longer times than 1 s count as
+    /// 1 s.
     pub fn expect_sends_every(&mut self, period: Duration) {
         self.cyclic.expect_sends_every(period);
     }

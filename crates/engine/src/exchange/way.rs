@@ -17,9 +17,14 @@ const FOREVER: u64 = u64::MAX / 4;
 /// Margin: this part of the way, and a constant for the host.
 const MARGIN_PART: u64 = 8;
 const MARGIN_NS: u64 = 10_000;
+/// Flights of a window, at least: of a slow domain a few are not representative.
+const LEAST_FLIGHTS: u8 = 16;
+
 /// The way of a frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Way {
+    /// Flights that came back in this window, up to 255.
+    flights: u8,
     /// Longest time from departure to return in this window and the last one.
     ns: u64,
     /// The same in this window.
@@ -39,6 +44,7 @@ pub(crate) struct Way {
 impl Default for Way {
     fn default() -> Way {
         Way {
+            flights: 0,
             ns: 0,
             window_ns: 0,
             closed_ns: 0,
@@ -62,6 +68,7 @@ impl Way {
     #[inline(always)]
     pub fn arrive(&mut self) {
         self.soon = Instant::NEVER;
+        self.flights = self.flights.saturating_add(1);
     }
 
     /// Whether a return now is later than the returns before in this window.
@@ -94,9 +101,10 @@ impl Way {
     /// A window ends: applies what was learned in it, and forgets the windows before.
     #[cold]
     pub fn refresh(&mut self, is_closed: bool) {
-        if self.window_ns == 0 {
+        if self.window_ns == 0 || (self.flights < LEAST_FLIGHTS && self.is_known()) {
             return;
         }
+        self.flights = 0;
         self.ns = core::mem::take(&mut self.window_ns);
         if is_closed {
             self.closed_ns = self.ns;

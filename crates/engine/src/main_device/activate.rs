@@ -32,6 +32,7 @@ use crate::procedures::reconcile::reconcile;
 use crate::procedures::shared_segment::{Beside, SharedSegment};
 use crate::queue::{Producer, queue};
 use crate::ring_status::{CableErrors, cables};
+use crate::segment::cabling::type_of;
 use crate::segment::clocks::Clocks;
 use crate::segment::findings::{DeclarationFinding, Oddity};
 use crate::segment::{Cabling, Declared, Found, Observation, SubDevices, stations_by_position};
@@ -82,6 +83,7 @@ impl MainDevice {
             .map_err(ActivateError::Layout)?;
         set_up_clocks(&mut exchange, clock_config.as_ref());
         let stations = stations_by_position(&subdevices, scan.subdevices.iter().map(|info| info.station));
+        let types = scan.subdevices.iter().map(|info| Some(type_of(info))).collect();
         let closings = loaded.closings(&topology, &subdevices, &stations);
         let cables = cables(&topology, self.options.links());
         let cables = cables.into_iter().map(|cable| (cable, CableErrors::default())).collect();
@@ -91,7 +93,7 @@ impl MainDevice {
         let declared = Box::new(Declared {
             subdevices,
             layout,
-            cabling: Cabling { topology, stations, cables, closings, version: 0 },
+            cabling: Cabling { topology, stations, types, cables, closings, version: 0 },
             clocks,
             ring: self.first_ring_status(),
             carriers: bus.carriers(),

@@ -97,6 +97,7 @@ pub(super) async fn keep_up(
                 segment.observe_member((index, attempt), MemberFinding::Failed(problem(&error)));
                 if segment.view().retries() == Retries::OnRequest {
                     segment.until_retried(index).await;
+                    disturbed = false;
                     continue;
                 }
             }

@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 use ringcat_wire::address::StationAddress;
 
 use super::subdevices::SubDevices;
+use crate::info::SubDeviceInfo;
 use crate::ring_status::{Cable, CableErrors};
 use crate::topology::Topology;
 
@@ -18,6 +19,8 @@ pub struct Cabling {
     pub topology: Topology,
     /// Station addresses by position, found at the same time.
     pub stations: Vec<StationAddress>,
+    /// Vendor and product code by position, found at the same time, as far as they were known.
+    pub types: Vec<Option<(u32, u32)>>,
     /// All cables with the error counts of their ends.
     pub cables: Vec<(Cable, CableErrors)>,
     /// Both ends of the closing cables of all rings behind junctions that were learned or declared, the junction's end
@@ -25,6 +28,11 @@ pub struct Cabling {
     pub closings: Vec<[End; 2]>,
     /// Increased with each change of cables, or of the SubDevices at their ends, since the scan.
     pub version: u32,
+}
+
+/// Vendor and product code of a SubDevice.
+pub fn type_of(info: &SubDeviceInfo) -> (u32, u32) {
+    (info.identity.vendor_id, info.identity.product_code)
 }
 
 /// Station addresses by position: those of members, and at other positions those of the scan.

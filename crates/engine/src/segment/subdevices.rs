@@ -177,7 +177,14 @@ impl SubDevices {
         self.remove(keys);
     }
 
-    /// What is known of a SubDevice that had left and has the same address still.
+    /// A SubDevice that had left, and has the same address still, gets another one.
+    pub(super) fn readdress(&mut self, before: StationAddress, station: StationAddress) {
+        if let Some((departed, _)) = self.departed.iter_mut().find(|(departed, _)| *departed == before) {
+            *departed = station;
+        }
+    }
+
+    /// What is known of a SubDevice that had left and has this address.
     pub(super) fn come_back(&mut self, station: StationAddress) -> Option<Presence> {
         let at = self.departed.iter().position(|(departed, _)| *departed == station)?;
         self.departed.remove(at).map(|(_, presence)| presence)

@@ -8,6 +8,9 @@ use ringcat_engine::time::Instant;
 use super::{Cyclic, SHORTEST_PERIOD, States};
 use crate::links::Links;
 
+/// The acyclic half has the wire between two sends. A longer time is that of a program that seldom sends.
+const LONGEST_EXPECTED: Duration = Duration::from_secs(1);
+
 impl Cyclic {
     /// Evaluates a domain, for an application with its own loop.
     pub fn process(&mut self, domain: DomainId, now: Instant) -> DomainStatus {
@@ -25,7 +28,7 @@ impl Cyclic {
 
     /// The time from one send to the next, for an application with its own loop.
     pub fn expect_sends_every(&mut self, period: Duration) {
-        self.period_ns = u64::try_from(period.max(SHORTEST_PERIOD).as_nanos()).unwrap_or(u64::MAX);
+        self.period_ns = period.clamp(SHORTEST_PERIOD, LONGEST_EXPECTED).as_nanos() as u64;
     }
 
     /// Sends the queued frames, for an application with its own loop: the next cycle is expected one period later.

@@ -66,6 +66,16 @@ impl Root {
         files
     }
 
+    /// No file and no directory is left.
+    fn is_empty(&self) -> bool {
+        std::fs::read_dir(self.path("/")).is_ok_and(|mut left| left.next().is_none())
+    }
+
+    fn write(&self, path: &str, text: &str) {
+        std::fs::create_dir_all(self.path(path).parent().expect("it is in a directory")).expect("it can be made");
+        std::fs::write(self.path(path), text).expect("it can be written");
+    }
+
     fn text(&self, path: &str) -> String {
         std::fs::read_to_string(self.path(path)).expect(path)
     }
@@ -118,7 +128,7 @@ fn all_files_come_to_the_places_of_a_distribution_and_nothing_is_left_of_them() 
     // The list of the files is the only one that is not counted.
     assert_eq!(expected.len(), 21);
     said(&root.run(&["--prefix", "/usr", "--uninstall"]), true);
-    assert!(!root.path("/").exists(), "{:?}", root.files());
+    assert!(root.is_empty(), "{:?}", root.files());
     let again = said(&root.run(&["--prefix", "/usr", "--uninstall"]), false);
     assert!(again.contains("nothing is installed here"), "{again}");
 }
@@ -176,7 +186,7 @@ fn every_place_can_be_chosen() {
         root.text("/a/unitdir/ethercat.service").contains("=/a/sbindir/ringcatd --conf /a/sysconfdir/ethercat.conf")
     );
     said(&root.run(&["--datadir", "/a/datadir", "--uninstall"]), true);
-    assert!(!root.path("/").exists(), "{:?}", root.files());
+    assert!(root.is_empty(), "{:?}", root.files());
 }
 
 // covers: daemon
@@ -201,17 +211,14 @@ fn an_edited_configuration_outlives_a_new_version_and_a_removal_but_no_purge() {
     assert_eq!(root.text(conf), edited);
     said(&root.run(&["--prefix", "/usr", "--uninstall"]), true);
     said(&root.run(&["--prefix", "/usr", "--uninstall", "--purge"]), true);
-    assert!(!root.path("/").exists(), "{:?}", root.files());
+    assert!(root.is_empty(), "{:?}", root.files());
 }
 
 // covers: daemon
 #[test]
 fn files_of_others_stay_and_those_of_an_older_version_go() {
     let root = Root::new();
-    for place in ["/usr/bin", "/usr/lib/udev/rules.d"] {
-        std::fs::create_dir_all(root.path(place)).expect("it can be made");
-        std::fs::write(root.path(place).join("other"), "").expect("it can be written");
-    }
+    ["/usr/bin/other", "/usr/lib/udev/rules.d/other"].iter().for_each(|other| root.write(other, ""));
     root.install(&["--prefix", "/usr"]);
     // The older version had a page more.
     std::fs::remove_file(root.directory.join("programs/shell/man8/ethercat-slaves.8")).expect("it is there");
@@ -219,6 +226,60 @@ fn files_of_others_stay_and_those_of_an_older_version_go() {
     assert!(!root.path("/usr/share/man/man8/ethercat-slaves.8").exists());
     said(&root.run(&["--prefix", "/usr", "--uninstall"]), true);
     assert_eq!(root.files(), BTreeSet::from(["/usr/bin/other", "/usr/lib/udev/rules.d/other"].map(String::from)));
+}
+
+// covers: daemon
+#[test]
+fn configuration_of_others_is_neither_overwritten_nor_removed() {
+    let root = Root::new();
+    let (conf, limits) = ("/etc/ethercat.conf", "/etc/security/limits.d/ethercat.conf");
+    [conf, limits].iter().for_each(|path| root.write(path, "of another master\n"));
+    for _ in 0..2 {
+        let about = root.install(&["--prefix", "/usr"]);
+        assert_eq!(about.matches("kept, because it was edited").count(), 2, "{about}");
+        assert!([conf, limits].iter().all(|path| root.text(path) == "of another master\n"));
+        assert!(root.text("/etc/ethercat.conf.new").contains("MASTER0_DEVICE"));
+    }
+    said(&root.run(&["--prefix", "/usr", "--uninstall", "--purge"]), true);
+    assert_eq!(root.files(), BTreeSet::from([conf, limits].map(String::from)));
+
+    // A link to a file that is kept elsewhere stays a link.
+    root.install(&["--prefix", "/opt/other"]);
+    root.write("/srv/ethercat.conf", "of a repository\n");
+    std::fs::remove_file(root.path(conf)).expect("it is there");
+    std::os::unix::fs::symlink(root.path("/srv/ethercat.conf"), root.path(conf)).expect("it can be made");
+    root.install(&["--prefix", "/opt/other"]);
+    assert_eq!(std::fs::read_link(root.path(conf)).expect("a link"), root.path("/srv/ethercat.conf"));
+    assert_eq!(root.text(conf), "of a repository\n");
+}
+
+// covers: daemon
+#[test]
+fn what_was_replaced_by_others_since_stays_and_parts_that_are_not_renewed_too() {
+    let root = Root::new();
+    root.install(&["--prefix", "/usr"]);
+    root.write("/usr/bin/ethercat", "the tool of another master\n");
+    root.install(&["--prefix", "/usr", "--init", "none"]);
+    let before = "/usr/lib/systemd/system/ethercat.service";
+    assert!(root.path(before).exists(), "the service was not renewed");
+    root.write("/usr/bin/ethercat", "the tool of another master\n");
+    said(&root.run(&["--prefix", "/usr", "--uninstall"]), true);
+    assert_eq!(root.files(), BTreeSet::from(["/usr/bin/ethercat".to_owned()]));
+}
+
+// covers: daemon
+#[test]
+fn a_relative_root_is_below_the_present_directory() {
+    let root = Root::new();
+    let mut install = Command::new(script());
+    install.current_dir(&root.directory).env("DESTDIR", "root/").args(["--prefix", "/usr", "--without-library"]);
+    said(&install.args(["--programs", "programs"]).output().expect("sh is there"), true);
+    assert!(root.path("/usr/bin/ringcat").exists());
+    let output = root.run(&["--programs", root.directory.join("programs").to_str().expect("text")]);
+    let about = said(&output, false);
+    assert!(about.contains("libringcat_ffi.a: add it, or choose --without-library"), "{about}");
+    said(&root.run(&["--prefix", "/usr", "--uninstall"]), true);
+    assert!(root.is_empty(), "{:?}", root.files());
 }
 
 // covers: daemon

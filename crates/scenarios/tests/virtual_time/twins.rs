@@ -228,6 +228,42 @@ fn a_spare_at_its_own_place_is_not_used_and_one_in_place_of_the_member_is() {
     }
 }
 
+/// While both have no power, a declared SubDevice is put in the place of an undeclared one of another type.
+// covers: identity
+#[test]
+fn a_declared_subdevice_in_the_place_of_an_undeclared_one_of_another_type_is_in_op() {
+    let kinds = ["coupler", "digital-output-8", "digital-output-16", "digital-input-8"];
+    for (is_ring, off_ms, with_idle) in
+        [(false, 50, true), (false, 1_500, false), (true, 50, false), (true, 1_500, true)]
+    {
+        let declared = vec![true, false, true, true];
+        let declare = |scan: &Scan| {
+            let found = scan.subdevices.iter().zip(&declared).filter(|(_, is)| **is).map(|(info, _)| info.clone());
+            automatic(&found.collect::<Vec<_>>(), CYCLE)
+        };
+        let options = Options::default().with_idle_operation(with_idle);
+        let build = if is_ring { ring } else { line };
+        let network = build(descriptions(&kinds), NetworkOptions::default());
+        let mut world = World::with(13, network, &options, declare).expect("scan and activation");
+        world.settle();
+        world.evaluate_latched(false);
+        world.run_cycles(200);
+        let text = format!("ring {is_ring}, off for {off_ms} ms, idle {with_idle}");
+        let mut twins = Twins { world, declared, text };
+        [1, 2].into_iter().for_each(|at| twins.world.power_off(DeviceIndex(at)));
+        twins.run(off_ms);
+        for (at, kind) in [(1, kinds[2]), (2, kinds[1])] {
+            let mut device = Device::new(describe(kind, "moved"));
+            device.power_off(twins.world.now());
+            *twins.world.network_mut().device_mut(DeviceIndex(at)) = device;
+        }
+        twins.declared = vec![true, true, false, true];
+        [1, 2].into_iter().for_each(|at| twins.world.power_on(DeviceIndex(at)));
+        twins.settle();
+        twins.run(500);
+    }
+}
+
 /// A spare of the type of the second SubDevice of a hot connect group is directly behind it: when that one is lost, a
 /// ring reaches the spare from the other side, as the next one behind the head of the group.
 // covers: identity, hot-connect

@@ -9,11 +9,12 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use ringcat_wire::address::StationAddress;
+use ringcat_wire::address::{Position, StationAddress};
 use ringcat_wire::register::{DlStatus, PortKind};
 
 use super::fit::fit;
 use crate::order::InOrder;
+use crate::segment::cabling::type_of;
 use crate::segment::knowledge::Knowledge;
 use crate::segment::matching::Fit;
 use crate::segment::member::Phase;
@@ -46,7 +47,22 @@ impl Segment {
     pub fn identified_by_cables(&self, view: &View, ports: &[DlStatus]) -> ByCables {
         let owners = self.owners(&view.stations);
         let owners: Vec<Option<usize>> = (0..view.stations.len()).map(|at| owners.at(at)).collect();
-        Present { segment: self, view, nodes: self.nodes(view, ports) }.identified(owners)
+        let kept = (0..owners.len()).map(|at| owners[at].map_or_else(|| self.kept_place(view, at), |_| None)).collect();
+        Present { segment: self, view, nodes: self.nodes(view, ports), kept }.identified(owners)
+    }
+
+    /// The place of a SubDevice without a declaration that has kept its address, by its present position.
+    fn kept_place(&self, view: &View, at: usize) -> Option<usize> {
+        let station = view.stations[at];
+        let place = self.cabling.stations.iter().position(|other| *other == station)?;
+        let is_alone = view.position(station) == Some(Position(at as u16));
+        let is_unassigned = || self.subdevices.unassigned().any(|it| it.key.station == station);
+        (self.is_of_others(place) && is_alone && is_unassigned()).then_some(place)
+    }
+
+    /// A SubDevice without a declaration was at this place.
+    fn is_of_others(&self, node: usize) -> bool {
+        self.subdevices.member_at(node).is_none()
     }
 
     /// Port states of all SubDevices, with their port kinds if known. By position.
@@ -84,6 +100,8 @@ struct Present<'a> {
     segment: &'a Segment,
     view: &'a View,
     nodes: Vec<NodeStatus>,
+    /// Places of SubDevices without a declaration that have kept their addresses, by present positions.
+    kept: Vec<Option<usize>>,
 }
 
 impl Present<'_> {
@@ -104,7 +122,7 @@ impl Present<'_> {
             for at in (0..members.len()).filter(|at| members[*at].is_none()) {
                 match self.candidate(at, at) {
                     Some(index) => result.members.push((self.view.stations[at], index)),
-                    None if self.is_of_others(at) => result.others.push(self.view.stations[at]),
+                    None if self.is_other(at, at) => result.others.push(self.view.stations[at]),
                     None => {}
                 }
             }
@@ -127,7 +145,7 @@ impl Present<'_> {
             };
             let sure: Vec<(usize, usize)> = found.iter().copied().filter(is_sure).collect();
             if sure.is_empty() {
-                let others = places.iter().filter(|(_, node)| self.is_of_others(*node));
+                let others = places.iter().filter(|(at, node)| self.is_other(*node, *at));
                 result.others = others.map(|(at, _)| self.view.stations[*at]).collect();
                 return result;
             }
@@ -138,9 +156,12 @@ impl Present<'_> {
         }
     }
 
-    /// A SubDevice without a declaration was at this place.
-    fn is_of_others(&self, node: usize) -> bool {
-        self.segment.subdevices.member_at(node).is_none()
+    /// The SubDevice at a position may be the one without a declaration that was at this place: a type that is known is
+    /// the same. One of another type was put there.
+    fn is_other(&self, node: usize, at: usize) -> bool {
+        let before = self.segment.cabling.types.get(node).copied().flatten();
+        let is_same = |before| self.unassigned_at(at).and_then(|it| Some(type_of(it.knowledge.info()?) == before));
+        self.segment.is_of_others(node) && before.is_none_or(|before| is_same(before).unwrap_or(true))
     }
 
     /// Unassigned SubDevices next to members, by position, with the place of before that they are at.
@@ -161,12 +182,7 @@ impl Present<'_> {
     /// declaration that has kept its address.
     fn place_before(&self, members: &[Option<usize>], end: End) -> Option<End> {
         let Some(PortOf { node, port }) = end else { return Some(None) };
-        let kept = || {
-            let station = self.unassigned_at(node)?.key.station;
-            let place = self.segment.cabling.stations.iter().position(|other| *other == station)?;
-            self.is_of_others(place).then_some(place)
-        };
-        let node = members[node].map_or_else(kept, |index| self.segment.member(index)?.node)?;
+        let node = members[node].map_or(self.kept[node], |index| self.segment.member(index)?.node)?;
         Some(Some(PortOf { node, port }))
     }
 

@@ -10,8 +10,9 @@ use crate::event::Event;
 use crate::link::LinkSet;
 use crate::ring::RingState;
 use crate::ring_status::{Cable, CableErrors, cables};
-use crate::segment::cabling::{Cabling, End, stations_by_position};
+use crate::segment::cabling::{Cabling, End, stations_by_position, type_of};
 use crate::segment::effect::{Effect, Effects};
+use crate::segment::knowledge::Knowledge;
 use crate::segment::member::Phase;
 use crate::segment::model::Segment;
 use crate::segment::seen::Seen;
@@ -74,8 +75,12 @@ impl Segment {
             let same = before.iter().find(|(ends, _)| *ends == now && now != [None, None]);
             (cable, same.map_or(CableErrors::default(), |(_, errors)| *errors))
         };
+        let type_at = |(at, station): (usize, &StationAddress)| {
+            self.known_at(seen.members.get(at).copied().flatten(), *station).and_then(Knowledge::info).map(type_of)
+        };
         let now = Cabling {
             topology: seen.topology.clone(),
+            types: seen.stations.iter().enumerate().map(type_at).collect(),
             stations: stations_by_position(&self.subdevices, seen.stations.iter().copied()),
             cables: cables(seen.topology, words.links()).into_iter().map(counted).collect(),
             closings: core::mem::take(&mut self.cabling.closings),

@@ -107,7 +107,8 @@ impl Segment {
     /// All tasks have ended without a result, and begin again when they are needed. At the beginning of a role as well:
     /// a role that is given up and taken again at once shows no end.
     fn end_tasks(&mut self) {
-        self.attention = Attention::default();
+        // Numbers of rounds go on. Nothing was seen since the last one.
+        self.attention = Attention { rounds: self.attention.rounds, ..Attention::default() };
         self.crossings.end_search();
         self.hot_connect.end_following();
         // Those that were being read get another address, and are read again.
@@ -119,6 +120,7 @@ impl Segment {
         }
         for (_, _, unassigned) in self.subdevices.all_unassigned_mut() {
             unassigned.upkeep.iter_mut().for_each(Upkeep::end_attempt);
+            unassigned.presence.since = None;
         }
     }
 

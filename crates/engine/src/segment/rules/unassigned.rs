@@ -78,6 +78,9 @@ impl Segment {
     ) {
         let is_valid = self.are_places_valid(versions);
         let since = self.addresses.change();
+        for given in given {
+            self.subdevices.readdress(given.before, given.station);
+        }
         // The next search finds them again.
         if !is_valid {
             return self.attention.want();
@@ -89,7 +92,7 @@ impl Segment {
             let at = At { position, owners: &owners, main_count };
             let key = SubDeviceKey { station: given.station, since };
             let unassigned = Unassigned { pdo_source: given.pdo_source(), ..Unassigned::at(&at) };
-            let presence = self.subdevices.come_back(given.before).unwrap_or_default();
+            let presence = self.subdevices.come_back(given.station).unwrap_or_default();
             let unassigned = Unassigned { presence, ..unassigned };
             self.subdevices.add(key, Knowledge::Awaited(now), unassigned);
             effects.start(Task::ReadUnassigned { key });

@@ -79,13 +79,15 @@ impl Shared {
         let length = {
             let source = self.identity.source();
             let mut builder = FrameBuilder::ethernet(&mut self.flights.buffer, MacAddress::ETHERCAT_GROUP, source)?;
-            let (mut total, mut datagrams, mut is_alone, mut follows) = (DATAGRAMS_AT, 0, false, false);
+            let (mut total, mut datagrams, mut is_alone) = (DATAGRAMS_AT, 0, false);
+            // Room of the frame for the rest of a group: of one that is sent again, less may be left.
+            let mut reserved = Rest::NONE;
             let reads = self.outbox.may_read(self.now);
-            let front = |outbox: &Outbox, now, follows| match follows {
-                true => outbox.front_of_urgent(),
-                false => outbox.front(reads, now),
+            let front = |outbox: &Outbox, now, reserved| {
+                let next = if reserved == Rest::NONE { None } else { outbox.front_of_urgent() };
+                next.or_else(|| outbox.front(reads, now))
             };
-            while let Some((id, rank)) = front(&self.outbox, self.now, follows) {
+            while let Some((id, rank)) = front(&self.outbox, self.now, reserved) {
                 let Some(transfer) = self.transfers.find(id) else {
                     self.outbox.pop(rank);
                     continue;
@@ -94,24 +96,26 @@ impl Shared {
                     self.outbox.pop(rank);
                     self.transfers.remove(id);
                     // The rest of its group is abandoned as well.
-                    follows = false;
+                    reserved = Rest::NONE;
                     continue;
                 }
                 let request = &transfer.request;
                 let group = request.group();
-                let fills_up = is_alone || request.before > 0 || datagrams + group.datagrams > self.max_datagrams;
+                let has_room = reserved != Rest::NONE && group == reserved;
+                let count = if has_room { request.datagrams() } else { group.datagrams };
+                let fills_up = is_alone || request.before > 0 || datagrams + count > self.max_datagrams;
                 if fills_up && !flight.datagrams.is_empty() {
                     break;
                 }
                 // Only the first datagram of a frame, with its group, may be longer than the window.
-                if !follows
+                if !has_room
                     && (total + group.bytes).max(MIN_FRAME) > limit
                     && (!flight.datagrams.is_empty() || !Shared::is_starved(&mut self.blocked, id, self.now))
                 {
                     break;
                 }
                 let index = sequence.index(Class::Acyclic);
-                (is_alone, follows) = (request.before > 0, request.rest != Rest::NONE);
+                (is_alone, reserved) = (request.before > 0, request.rest);
                 let Some(data_at) = put(&mut builder, request, index, self.now) else { break };
                 let bytes = request.bytes();
                 (total, datagrams) = (total + bytes, datagrams + request.datagrams());

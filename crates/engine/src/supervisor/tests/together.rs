@@ -102,3 +102,42 @@ fn the_send_window_applies_again_after_an_abandoned_group() {
     bench.supervisor.transmit(bench.now, 100, &mut |link, frame| sent.push((link, frame.to_vec())));
     assert_eq!(sent.len(), 0);
 }
+
+// covers: registers
+#[test]
+fn of_more_writes_than_a_frame_may_have_each_frame_but_the_last_is_full() {
+    let mut bench = Bench::new(LinkSet::Single);
+    bench.supervisor.set_max_datagrams(2);
+    let bus = bench.supervisor.bus();
+    let all = writes().into_iter().chain(writes()).take(5).collect::<Vec<_>>();
+    bench.start(async move { bus.transfer_together(all, Some(Wkc(1))).await });
+    bench.supervisor.poll(bench.now);
+    send(&mut bench, 1514);
+    assert_eq!(in_frames(&bench.sent), [2, 2, 1]);
+}
+
+/// In a ring the first copy may answer one of a group, and the second one be lost.
+// covers: registers
+#[test]
+fn after_a_part_of_a_group_others_do_not_exceed_the_window() {
+    let mut bench = Bench::new(LinkSet::Ring);
+    let bus = bench.supervisor.bus();
+    bench.start(async move { bus.transfer_together(writes(), Some(Wkc(1))).await });
+    bench.step();
+    let mut copy = answered(&bench.sent[0].1, 0, 0);
+    let end = copy.len();
+    // The last of the three writes was executed.
+    let last = HEADER_LEN + 2 + 2;
+    let wkc_at = 16 + 3 * last - 2;
+    assert!(wkc_at + 2 <= end);
+    copy[wkc_at..wkc_at + 2].copy_from_slice(&1u16.to_le_bytes());
+    bench.supervisor.receive(Link::Main, &copy, bench.now);
+    bench.pass(Duration::from_millis(200));
+    let bus = bench.supervisor.bus();
+    bench.start(async move { bus.fpwr_first(STATION, map::PROCESS_RAM, &[0; 400]).await });
+    bench.supervisor.poll(bench.now);
+    bench.sent.clear();
+    send(&mut bench, 120);
+    assert_eq!(in_frames(&bench.sent)[..1], [2], "{:?}", in_frames(&bench.sent));
+    assert!(bench.sent[0].1.len() <= 120, "{}", bench.sent[0].1.len());
+}
