@@ -60,7 +60,7 @@ mod words;
 
 pub use addressed::Addressed;
 pub use ascent::longest_ascent;
-pub use cabling::{Cabling, stations_by_position};
+pub use cabling::{Cabling, stations_by_position, type_of};
 pub use choices::{Choices, ReadPdos, Retries};
 pub use crossings::{Crossing, LineCheck, PORT_BITS, is_swapped};
 pub use given::Given;

@@ -85,6 +85,11 @@ impl Default for Attention {
 }
 
 impl Attention {
+    /// Nothing is requested and nothing under way, as at the beginning; numbers of rounds go on.
+    pub fn begun_anew(&self) -> Attention {
+        Attention { rounds: self.rounds, ..Attention::default() }
+    }
+
     /// Something differs from when the last round began, or a round is requested.
     pub fn has_changed(&self, reader: &Reader, words: &Words, reported: RingState) -> bool {
         reader.round.has_changed(words) || reported != self.reported || self.request == Request::Now

@@ -126,6 +126,7 @@ impl Ring {
         let (subdevices, topology_found) = ((0..count).map(info).collect(), topology.clone());
         let scan = Scan { subdevices, topology: topology_found, main_count: count, redundant_count: 0 };
         let cabling = Cabling {
+            types: Vec::new(),
             cables: cables.collect(),
             topology,
             stations: (0..count).map(station).collect(),

@@ -9,7 +9,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use ringcat_wire::address::{Position, StationAddress};
+use ringcat_wire::address::StationAddress;
 use ringcat_wire::register::{DlStatus, PortKind};
 
 use super::fit::fit;
@@ -55,7 +55,7 @@ impl Segment {
     fn kept_place(&self, view: &View, at: usize) -> Option<usize> {
         let station = view.stations[at];
         let place = self.cabling.stations.iter().position(|other| *other == station)?;
-        let is_alone = view.position(station) == Some(Position(at as u16));
+        let is_alone = view.position(station) == Some(at);
         let is_unassigned = || self.subdevices.unassigned().any(|it| it.key.station == station);
         (self.is_of_others(place) && is_alone && is_unassigned()).then_some(place)
     }

@@ -76,7 +76,9 @@ impl Segment {
             (cable, same.map_or(CableErrors::default(), |(_, errors)| *errors))
         };
         let type_at = |(at, station): (usize, &StationAddress)| {
-            self.known_at(seen.members.get(at).copied().flatten(), *station).and_then(Knowledge::info).map(type_of)
+            self.known_at(seen.members.get(at).copied().flatten(), *station)
+                .and_then(Knowledge::info)
+                .map(|info| type_of(info))
         };
         let now = Cabling {
             topology: seen.topology.clone(),

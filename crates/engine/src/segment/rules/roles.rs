@@ -7,7 +7,6 @@ use ringcat_wire::al::{AlState, AlStatus};
 use crate::board::live::{Life, Presence};
 use crate::declared::SubDeviceId;
 use crate::event::Event;
-use crate::segment::attention::Attention;
 use crate::segment::effect::{Check, Effects, Watch};
 use crate::segment::key::SubDeviceKey;
 use crate::segment::knowledge::Knowledge;
@@ -108,7 +107,7 @@ impl Segment {
     /// a role that is given up and taken again at once shows no end.
     fn end_tasks(&mut self) {
         // Numbers of rounds go on. Nothing was seen since the last one.
-        self.attention = Attention { rounds: self.attention.rounds, ..Attention::default() };
+        self.attention = self.attention.begun_anew();
         self.crossings.end_search();
         self.hot_connect.end_following();
         // Those that were being read get another address, and are read again.
