@@ -82,7 +82,6 @@ impl MainDevice {
             .map_err(ActivateError::Layout)?;
         set_up_clocks(&mut exchange, clock_config.as_ref());
         let stations = stations_by_position(&subdevices, scan.subdevices.iter().map(|info| info.station));
-        let types = scan.subdevices.iter().map(|info| Some(type_of(info))).collect();
         let closings = loaded.closings(&topology, &subdevices, &stations);
         let cables = cables(&topology, self.options.links());
         let cables = cables.into_iter().map(|cable| (cable, CableErrors::default())).collect();
@@ -92,7 +91,7 @@ impl MainDevice {
         let declared = Box::new(Declared {
             subdevices,
             layout,
-            cabling: Cabling { topology, stations, types, cables, closings, version: 0 },
+            cabling: Cabling { topology, stations, types: types_of(&scan), cables, closings, version: 0 },
             clocks,
             ring: self.first_ring_status(),
             carriers: bus.carriers(),
@@ -166,6 +165,11 @@ impl MainDevice {
         self.activations = self.activations.wrapping_add(1);
         (self.activations - 1).wrapping_add((now.0 >> STEP_BITS) as u32)
     }
+}
+
+/// Vendor and product code by position.
+fn types_of(scan: &Found) -> Vec<Option<(u32, u32)>> {
+    scan.subdevices.iter().map(|info| Some(type_of(info))).collect()
 }
 
 /// Clocks of all SubDevices of the scan.

@@ -53,8 +53,7 @@ pub(super) async fn keep_up(
     reported: Option<Shown>,
 ) {
     let (mut start, mut reported) = (start, reported);
-    let mut pause = FIRST_PAUSE;
-    let mut disturbed = false;
+    let (mut pause, mut disturbed) = (FIRST_PAUSE, false);
     loop {
         let result = try_once(bus, segment, (index, attempt), start, &mut reported).await;
         bus.step(Subject::States, || match &result {

@@ -79,13 +79,12 @@ impl Shared {
         let length = {
             let source = self.identity.source();
             let mut builder = FrameBuilder::ethernet(&mut self.flights.buffer, MacAddress::ETHERCAT_GROUP, source)?;
-            let (mut total, mut datagrams, mut is_alone) = (DATAGRAMS_AT, 0, false);
-            // Room of the frame for the rest of a group: of one that is sent again, less may be left.
-            let mut reserved = Rest::NONE;
+            // `reserved`: for the rest of a group. Of one that is sent again, less may be left.
+            let (mut total, mut datagrams, mut is_alone, mut reserved) = (DATAGRAMS_AT, 0, false, Rest::NONE);
             let reads = self.outbox.may_read(self.now);
-            let front = |outbox: &Outbox, now, reserved| {
-                let next = if reserved == Rest::NONE { None } else { outbox.front_of_urgent() };
-                next.or_else(|| outbox.front(reads, now))
+            let front = |outbox: &Outbox, now, reserved| match reserved == Rest::NONE {
+                true => outbox.front(reads, now),
+                false => outbox.front_of_urgent().or_else(|| outbox.front(reads, now)),
             };
             while let Some((id, rank)) = front(&self.outbox, self.now, reserved) {
                 let Some(transfer) = self.transfers.find(id) else {
