@@ -86,6 +86,7 @@ impl Default for Attention {
 
 impl Attention {
     /// Nothing is requested and nothing under way, as at the beginning; numbers of rounds go on.
+    #[cfg(feature = "standby")]
     pub fn begun_anew(&self) -> Attention {
         Attention { rounds: self.rounds, ..Attention::default() }
     }
