@@ -159,6 +159,7 @@ mod tests {
         if way.is_later(now) {
             way.learn(Instant(1_000), now, is_closed, false);
         }
+        way.arrive();
     }
 
     // covers: lost-frames
@@ -230,6 +231,22 @@ mod tests {
             window(&mut way, &[], false);
             assert_eq!(way.wait_ns(), usual, "{late:?}");
         }
+    }
+
+    // covers: lost-frames
+    #[test]
+    fn the_wait_of_a_slow_domain_does_not_follow_single_short_flights() {
+        let mut way = Way::default();
+        window(&mut way, &[], false);
+        let usual = way.wait_ns();
+        for short in 0..15 {
+            flight(&mut way, 20_000, false);
+            way.refresh(false);
+            assert_eq!(way.wait_ns(), usual, "after {short}");
+        }
+        flight(&mut way, 20_000, false);
+        way.refresh(false);
+        assert!(way.wait_ns() < usual);
     }
 
     // covers: lost-frames
