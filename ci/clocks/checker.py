@@ -257,7 +257,7 @@ class Checker:
             at = zeros[group] + begin if group in zeros else None
             for other, span in (share for share in inside if share[0] in zeros):
                 if at is not None and zeros[other] < at:
-                    text = f"it begins {at - zeros[other]:.1f} ns before what is in front of it has ended"
+                    text = f"it begins {at - zeros[other]:.1f} ns before the branch processed earlier has ended"
                     errors.append((other, at - zeros[other], text))
                 at = zeros[other] + span
             if group in zeros and at > zeros[group] + end:

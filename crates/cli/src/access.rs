@@ -31,16 +31,16 @@ pub struct Access {
     /// The recording.
     pub recording: Recording,
     /// What the command has of a daemon.
-    pub tenure: Tenure,
+    pub daemon_bus: DaemonBus,
     /// Keeps processors awake.
     pub awake: Option<CpuLatency>,
 }
 
 /// The bus of a daemon, until it is given back; or none.
 #[derive(Debug)]
-pub struct Tenure(Option<OwnedBus>);
+pub struct DaemonBus(Option<OwnedBus>);
 
-impl Tenure {
+impl DaemonBus {
     /// What the daemon knew of the segment; `None` where this command scans.
     pub fn scan(&self) -> Option<Scan> {
         self.0.as_ref().and_then(|bus| bus.scan().ok())
@@ -75,7 +75,7 @@ impl AccessArguments {
         let (cyclic, acyclic) = (recording.tee(EitherLinks::First(cyclic)), recording.tee(acyclic));
         let awake = thread.prepare_process();
         let supervisor = SupervisorThread::start(acyclic, options, move || thread.prepare_supervisor())?;
-        Ok(Access { interfaces, supervisor, cyclic, surroundings, recording, tenure: Tenure(None), awake })
+        Ok(Access { interfaces, supervisor, cyclic, surroundings, recording, daemon_bus: DaemonBus(None), awake })
     }
 
     fn take(&self, master: u32, options: &Options) -> Result<Access, Failure> {
@@ -102,7 +102,7 @@ impl AccessArguments {
             EitherLinks::Second(_) => Surroundings::unwatched(&interfaces),
         };
         let (cyclic, supervisor) = (recording.tee(links), bus.supervisor().clone());
-        Ok(Access { interfaces, supervisor, cyclic, surroundings, recording, tenure: Tenure(Some(bus)), awake })
+        Ok(Access { interfaces, supervisor, cyclic, surroundings, recording, daemon_bus: DaemonBus(Some(bus)), awake })
     }
 }
 

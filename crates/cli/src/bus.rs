@@ -14,10 +14,10 @@ use ringcat::{AlState, Event, JunctionError, Links, MainDevice, Options, Scan, S
 use crate::failure::Failure;
 use crate::interfaces::{InterfaceArguments, LinkNames, SourceAddress};
 use crate::modules::{self, Detected, Failed, List};
-use crate::oddities::SiiOddities;
 use crate::output::{complain, warn};
 use crate::surroundings::Surroundings;
 use crate::thread::ThreadArguments;
+use crate::warnings::SiiWarnings;
 
 /// Object with the version of the firmware (protocol 6.3, ETG.1000.6).
 const FIRMWARE: u16 = 0x100A;
@@ -61,7 +61,7 @@ pub struct Bus {
     /// A declared ring behind a junction that does not close.
     pub not_closed: Option<JunctionError>,
     /// Faults of the SIIs, which are to be printed.
-    pub oddities: SiiOddities,
+    pub warnings: SiiWarnings,
 }
 
 /// What is read of a SubDevice besides the scan.
@@ -121,13 +121,13 @@ fn scan<L: Links>(
 ) -> Result<Bus, Failure> {
     let junctions = declared.map(|declared| declared.rings.junctions).unwrap_or_default();
     let mut main_device = MainDevice::request(links, &options.with_junctions(junctions));
-    let mut oddities = SiiOddities::default();
+    let mut warnings = SiiWarnings::default();
     let scan = main_device.scan_with(|event| {
-        if !oddities.keep(event) {
+        if !warnings.keep(event) {
             on_event(event);
         }
     });
-    let mut scan = scan.inspect_err(|_| oddities.print(&[]))?;
+    let mut scan = scan.inspect_err(|_| warnings.print(&[]))?;
     if let Some(declared) = declared {
         main_device.read_data_words(&declared.declaration.subdevices, &mut scan);
     }
@@ -143,7 +143,7 @@ fn scan<L: Links>(
         unlisted.push(detected.list == List::Missing || !has_objects);
         modules.push(detected.idents);
     }
-    Ok(Bus { scan, ring, firmware, modules, lists, unlisted, not_closed, oddities })
+    Ok(Bus { scan, ring, firmware, modules, lists, unlisted, not_closed, warnings })
 }
 
 /// A declared ring behind a junction that does not close, by the test of an activation.

@@ -88,9 +88,9 @@ pub fn run(arguments: &ClocksArguments) -> Result<Report, Failure> {
     let mut descriptions = arguments.esi.open()?;
     let end = EndRequest::watch(thread.priority)?;
     let access = arguments.access.begin(&arguments.access.interfaces.options())?;
-    let Access { supervisor, cyclic, surroundings, recording, tenure, awake: _awake, .. } = access;
+    let Access { supervisor, cyclic, surroundings, recording, daemon_bus, awake: _awake, .. } = access;
     let begin = now();
-    let mut scan = match tenure.scan() {
+    let mut scan = match daemon_bus.scan() {
         Some(scan) => scan,
         None => supervisor.scan().map_err(|error| surroundings.explain(error, supervisor.counters().foreign))?,
     };
@@ -124,7 +124,7 @@ pub fn run(arguments: &ClocksArguments) -> Result<Report, Failure> {
         panicked.application
     });
     reasons.extend(application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT).err().map(|error| error.to_string()));
-    reasons.extend(tenure.end());
+    reasons.extend(daemon_bus.end());
     reasons.extend(recording.finish());
     let verdict = Verdict::of(reasons, format!("{} locked and together", counted(clocks.len(), "clock", "clocks")));
     let phase_errors = cyclic_status.phase_errors();

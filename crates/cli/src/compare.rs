@@ -67,7 +67,7 @@ pub fn run(arguments: &CompareArguments) -> Result<Report, Failure> {
     let unlisted = report_unlisted(&bus, &configuration, &counterparts);
     mark_modular(&mut stated, &bus, &counterparts, descriptions.as_mut());
     let described = complete(descriptions.as_mut(), &mut bus.scan.subdevices, &bus.modules)?;
-    bus.oddities.print(&described);
+    bus.warnings.print(&described);
     let found = &bus.scan.subdevices;
     let network = FoundNetwork::new(found, &bus.scan.topology)
         .with_firmware(&bus.firmware)

@@ -113,7 +113,7 @@ pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
     let mut bus = arguments.bus.scan(None, |found| found.iter().map(&mut wanted).collect())?;
     let scanned = Instant::now();
     let objects = objects(descriptions.as_mut(), &mut bus.scan.subdevices, &bus.modules)?;
-    bus.oddities.print(&objects);
+    bus.warnings.print(&objects);
     let mut options = ScanOptions::new(&arguments.name, arguments.cycle);
     options.ring = bus.ring;
     options.clocks = arguments.clocks || !arguments.sync.is_empty();

@@ -19,7 +19,6 @@ mod interfaces;
 mod json;
 mod modules;
 mod numbers;
-mod oddities;
 mod others;
 mod output;
 mod recording;
@@ -39,6 +38,7 @@ mod thread;
 mod times;
 mod under_way;
 mod verdict;
+mod warnings;
 
 use std::io::{IsTerminal, stdout};
 use std::process::ExitCode;

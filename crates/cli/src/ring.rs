@@ -66,10 +66,10 @@ pub fn run(arguments: &RingArguments) -> Result<Report, Failure> {
 /// The ring of a master of the daemon.
 fn of_master(arguments: &RingArguments) -> Result<Report, Failure> {
     let access = arguments.access.begin(&arguments.access.interfaces.options())?;
-    let Access { interfaces, supervisor, cyclic, recording, tenure, .. } = access;
+    let Access { interfaces, supervisor, cyclic, recording, daemon_bus, .. } = access;
     let inspection = inspect(arguments.lasts, || supervisor.inspect_ring())?;
     drop(cyclic);
-    let reasons = [tenure.end(), recording.finish()];
+    let reasons = [daemon_bus.end(), recording.finish()];
     Ok(report(&inspection, interfaces.links.redundant.is_some(), reasons))
 }
 

@@ -4,7 +4,6 @@
 //! with a file, have the values of `--set`. The summary distinguishes why cycles are late: late wake-ups and left out
 //! cycles are due to this machine, lost frames to the wire.
 
-mod beside;
 pub mod configured;
 pub mod declared;
 mod exchange;
@@ -14,6 +13,7 @@ mod live;
 mod options;
 mod pace;
 mod reasons;
+mod services;
 mod summary;
 pub mod watched;
 
@@ -65,10 +65,10 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
     let mut descriptions = arguments.esi.open()?;
     let end = EndRequest::watch(arguments.access.thread.priority)?;
     let (access, network) = begin(arguments)?;
-    let Access { interfaces, supervisor, mut cyclic, mut surroundings, recording, tenure, awake: _awake } = access;
+    let Access { interfaces, supervisor, mut cyclic, mut surroundings, recording, daemon_bus, awake: _awake } = access;
     let begin = now();
-    let beside = arguments.beside.start(&supervisor, &interfaces)?;
-    let mut scan = match tenure.scan() {
+    let services = arguments.services.start(&supervisor, &interfaces)?;
+    let mut scan = match daemon_bus.scan() {
         Some(scan) => scan,
         None => scan(&supervisor, &mut cyclic, &mut surroundings, begin)?,
     };
@@ -90,7 +90,7 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
     let ring = interfaces.links.redundant.is_some();
     let events = EventLog::new(begin, names).with_every_event(arguments.all_events);
     let log = RunLog::new(begin, events, surroundings).with_objects(objects);
-    let mut run = Run { cycles, log, live: Live::new(ring, clocks), clocks, domains, beside, watched, recording };
+    let mut run = Run { cycles, log, live: Live::new(ring, clocks), clocks, domains, services, watched, recording };
     let reached = run.reach_op(arguments.within, &end);
     let before = Seen::of(run.cycles.cyclic_status());
     if reached.is_ok() {
@@ -113,7 +113,7 @@ pub fn run(arguments: &RunArguments) -> Result<Report, Failure> {
         reasons.push(format!("the file lacks {} of the bus", counted(undeclared, "SubDevice", "SubDevices")));
     }
     let data = finish(run, &mut at_end, &jobs, &interfaces.links, &mut reasons);
-    reasons.extend(tenure.end());
+    reasons.extend(daemon_bus.end());
     let lasted = arguments.lasts.map_or_else(String::new, |lasts| format!(" for {}", in_words(lasts)));
     let subdevices = counted(scan.subdevices.len(), "SubDevice", "SubDevices");
     let verdict = Verdict::of(reasons, format!("{subdevices} in OP{lasted}, every cycle complete"));
@@ -152,7 +152,7 @@ fn junctions(
     network.filter(|_| arguments.junction.mode == JunctionMode::Disabled).and_then(ConfiguredNetwork::junctions)
 }
 
-/// Scans, and meanwhile reports oddities of the cabling and other MainDevices.
+/// Scans, and meanwhile reports warnings about the cabling and other MainDevices.
 fn scan(
     supervisor: &SupervisorThread,
     cyclic: &mut impl Links,
@@ -281,10 +281,10 @@ fn finish(run: Run, end: &mut End, jobs: &Jobs, links: &LinkNames, reasons: &mut
         clock_account(end.exchanged.clocks(), application.cyclic_status(), names);
     }
     run.watched.account();
-    run.beside.account();
+    run.services.account();
     let mut json = json(&application, end, names, run.clocks);
-    json.ethernet = run.beside.json_ethernet();
-    json.gateway = run.beside.json_gateway();
+    json.ethernet = run.services.json_ethernet();
+    json.gateway = run.services.json_gateway();
     json.variables = run.watched.json();
     json.jobs = jobs.json();
     match application.stop(LastOutputs::Zero, AlState::Init, STOP_LIMIT) {
@@ -300,7 +300,7 @@ fn finish(run: Run, end: &mut End, jobs: &Jobs, links: &LinkNames, reasons: &mut
     Data::Run(Box::new(json))
 }
 
-/// Reports other MainDevices and oddities of the cabling among the events of a scan.
+/// Reports other MainDevices and warnings about the cabling among the events of a scan.
 fn report_events(supervisor: &SupervisorThread, surroundings: &mut Surroundings, begin: Instant) {
     while let Some(event) = supervisor.pop_event() {
         if let Event::JunctionLearned { .. }

@@ -92,7 +92,7 @@ impl RunLog {
 /// Texts of an event with the names of the objects that it mentions.
 fn with_objects(event: &Event, objects: &[ObjectNames], texts: [String; 2]) -> [String; 2] {
     let (Event::ConfigurationFailed { subdevice, .. }
-    | Event::PlanOddity { subdevice, .. }
+    | Event::DeclarationWarning { subdevice, .. }
     | Event::StartupRead { subdevice, .. }) = event
     else {
         return texts;

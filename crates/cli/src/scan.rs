@@ -14,18 +14,18 @@ use crate::ending::EndRequest;
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::scan;
-use crate::oddities::SiiOddities;
 use crate::output::{complain, counted, say, warn};
 use crate::surroundings::Surroundings;
 use crate::table;
 use crate::verdict::{Report, Verdict};
+use crate::warnings::SiiWarnings;
 
 /// Text at the end of the long help.
 const ABOUT_SCAN: &str = "\
 All SubDevices go to INIT: a segment that is in operation leaves it. So a scan
 refuses to begin where another MainDevice uses the interface or sends into the
 segment; --force goes on all the same. It waits up to 5 s for the first
-SubDevice to answer. Oddities of cables and EEPROMs go to the standard error
+SubDevice to answer. Warnings about cables and EEPROMs go to the standard error
 output, the table or JSON to the standard output.";
 
 /// Options of `ringcat scan`.
@@ -57,10 +57,10 @@ pub fn run(arguments: &ScanArguments) -> Result<Report, Failure> {
     let links = recording.tee(links);
     let _awake = thread.apply();
     let mut main_device = MainDevice::request(links, &interfaces.options());
-    let mut oddities = SiiOddities::default();
+    let mut warnings = SiiWarnings::default();
     let result = main_device.scan_with(|event| match &event.event {
         Event::ScanProgress { .. } | Event::ScanFailed { .. } => {}
-        _ if oddities.keep(event) => {}
+        _ if warnings.keep(event) => {}
         _ => match surroundings.note(&event.event) {
             None => complain(describe(event, &Names::default())),
             Some(words) => words.into_iter().for_each(warn),
@@ -68,7 +68,7 @@ pub fn run(arguments: &ScanArguments) -> Result<Report, Failure> {
     });
     let foreign = main_device.acyclic_counters().foreign;
     let mut scan = result.map_err(|error| {
-        oddities.print(&[]);
+        warnings.print(&[]);
         surroundings.explain(error, foreign)
     })?;
     if foreign > 0 {
@@ -85,7 +85,7 @@ pub fn run(arguments: &ScanArguments) -> Result<Report, Failure> {
     let idents: Vec<Vec<u32>> = scan.subdevices.iter().map(&mut modules).collect();
     drop(main_device);
     let objects = complete(descriptions.as_mut(), &mut scan.subdevices, &idents)?;
-    oddities.print(&objects);
+    warnings.print(&objects);
     let data = show(arguments.pdos, &objects, &scan);
     let verdict = Verdict::Held(counted(data.subdevices.len(), "SubDevice", "SubDevices")).and(recording.finish());
     Ok(Report { verdict, data: Data::Scan(data) })
@@ -110,8 +110,8 @@ fn show(with_pdos: bool, objects: &[ObjectNames], scan: &Scan) -> scan::Scan {
 /// Knowledge of a daemon about the bus of a master. Nothing is scanned: a daemon does that after each change.
 fn known(arguments: &ScanArguments, mut descriptions: Option<Descriptions>) -> Result<Report, Failure> {
     let access = &arguments.access;
-    let Access { supervisor, cyclic, recording, tenure, .. } = access.begin(&access.interfaces.options())?;
-    let mut scan = match tenure.scan() {
+    let Access { supervisor, cyclic, recording, daemon_bus, .. } = access.begin(&access.interfaces.options())?;
+    let mut scan = match daemon_bus.scan() {
         Some(scan) => scan,
         None => supervisor.scan()?,
     };
@@ -119,6 +119,6 @@ fn known(arguments: &ScanArguments, mut descriptions: Option<Descriptions>) -> R
     drop(cyclic);
     let data = show(arguments.pdos, &objects, &scan);
     let verdict = Verdict::Held(counted(data.subdevices.len(), "SubDevice", "SubDevices"));
-    let verdict = verdict.and(tenure.end()).and(recording.finish());
+    let verdict = verdict.and(daemon_bus.end()).and(recording.finish());
     Ok(Report { verdict, data: Data::Scan(data) })
 }

@@ -16,9 +16,9 @@ use crate::network::model;
 const MAX_NAMES: usize = 1 << 16;
 /// Characters of a name; the rest is left out.
 const MAX_NAME: usize = 256;
-/// Words in front of an index without a subindex that is that of an object.
+/// Words before an index without a subindex that is that of an object.
 const BEFORE_INDEX: [&str; 2] = ["PDO ", "object "];
-/// The word in front of the ident of a module.
+/// The word before the ident of a module.
 const BEFORE_IDENT: &str = "module ";
 
 /// Names of the PDOs, entries and objects of a SubDevice.

@@ -41,7 +41,7 @@ pub use digest::{ConfigPart, Digest};
 pub(crate) use groups::can_be_head;
 pub use groups::{Group, data_words, groups};
 pub use ip::IpSettings;
-pub use matching::Marked;
+pub use matching::SubDevicesByIdentifier;
 pub use pdo::{PdoAssignment, PdoEntry, PdoMapping};
 pub use refused_pdos::RefusedPdos;
 pub use register::{RegisterAccess, RegisterCommand};

@@ -115,7 +115,7 @@ pub enum Event {
         code: AlStatusCode,
     },
     /// A fault in a SubDevice's SII that was worked around.
-    SiiOddity {
+    SiiWarning {
         /// Position.
         position: Position,
         /// The fault.
@@ -188,7 +188,7 @@ pub enum Event {
         link: Link,
     },
     /// Another fault of a SubDevice's ports.
-    CablingOddity {
+    CablingWarning {
         /// Position.
         position: Position,
         /// The fault.
@@ -290,7 +290,7 @@ pub enum Event {
         reason: String,
     },
     /// A setting in a declaration that the SubDevice may not follow.
-    PlanOddity {
+    DeclarationWarning {
         /// Index in the declaration.
         subdevice: SubDeviceId,
         /// The setting.

@@ -8,14 +8,14 @@ type At = (u64, Instant);
 /// Application times before the activation. The grid of SYNC pulses begins with the first one; the application time
 /// continues from the last one.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Given {
+pub struct GivenTimes {
     /// The first time that is not 0.
     pub first: Option<At>,
     /// The last time; `None` if that is 0.
     pub last: Option<At>,
 }
 
-impl Given {
+impl GivenTimes {
     /// The application sets a time now.
     pub fn set(&mut self, time: u64) {
         self.last = (time != 0).then(|| (time, Instant::now()));
@@ -35,7 +35,7 @@ mod tests {
     // covers: dc-sync, c-interface
     #[test]
     fn the_grid_begins_with_the_first_time_and_the_time_continues_from_the_last() {
-        let mut given = Given::default();
+        let mut given = GivenTimes::default();
         given.set(0);
         assert!(given.first.is_none() && given.last.is_none());
         given.set(7);

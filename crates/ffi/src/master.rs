@@ -19,7 +19,7 @@ use crate::claim::Claim;
 use crate::code::{Code, Outcome, report};
 use crate::draft::Draft;
 use crate::environment::socket;
-use crate::given_time::{Given, passed_since};
+use crate::given_time::{GivenTimes, passed_since};
 use crate::host::{check_memory, variable, watch_forks};
 use crate::locks::locked;
 use crate::network::Network;
@@ -74,7 +74,7 @@ pub struct Master {
     /// The last time of the application; 0 before.
     application_time: AtomicU64,
     /// Times before activation.
-    given: Mutex<Given>,
+    given: Mutex<GivenTimes>,
     /// Memory of images that no application uses.
     memory: Mutex<Vec<&'static mut [u8]>>,
 }
@@ -294,7 +294,7 @@ impl Master {
             application.expect_sends_every(interval);
         }
         let now = application.now();
-        let Given { first, last } = std::mem::take(&mut *locked(&self.given));
+        let GivenTimes { first, last } = std::mem::take(&mut *locked(&self.given));
         if let Some((time, at)) = first {
             application.set_first_application_time(time, Instant(now.0.saturating_sub(passed_since(at))));
         }
@@ -354,7 +354,7 @@ impl Master {
         bus.give_links_back(ended.links);
         draft.clear();
         self.application_time.store(0, Ordering::Relaxed);
-        *locked(&self.given) = Given::default();
+        *locked(&self.given) = GivenTimes::default();
         self.follow_live_status(&bus);
         self.is_active.store(false, Ordering::Release);
         draft.set_found(bus.found()?);

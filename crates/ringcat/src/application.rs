@@ -32,7 +32,7 @@ use crate::error::Error;
 use crate::histogram::Histogram;
 use crate::links::Links;
 use crate::pace::{Pace, Trigger};
-use crate::probe::{CycleJob, CycleProbe, Lap};
+use crate::probe::{CycleJob, CycleProbe, JobTimer};
 use crate::process_data::ProcessData;
 use crate::window::Window;
 
@@ -80,12 +80,12 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     #[inline(always)]
     pub fn cycle_probed<P: CycleProbe, R>(&mut self, probe: &mut P, work: impl FnOnce(&mut ProcessData<'_>) -> R) -> R {
         let (now, looked_at) = self.wait_for_cycle(probe);
-        let mut lap = Lap::begin::<P>(|| self.links.now());
+        let mut timer = JobTimer::begin::<P>(|| self.links.now());
         self.cyclic.begin(now, looked_at);
-        lap.done(probe, CycleJob::Process, || self.links.now());
+        timer.done(probe, CycleJob::Process, || self.links.now());
         let result = work(&mut self.cyclic.data(now));
-        lap.done(probe, CycleJob::Work, || self.links.now());
-        self.cyclic.end(now, &mut self.links, probe, lap);
+        timer.done(probe, CycleJob::Work, || self.links.now());
+        self.cyclic.end(now, &mut self.links, probe, timer);
         result
     }
 
@@ -130,7 +130,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         if H::SHARES_LINKS || sends_again {
             now = links.now();
         }
-        let (mut is_back, mut lap) = (false, Lap::begin::<P>(|| links.now()));
+        let (mut is_back, mut timer) = (false, JobTimer::begin::<P>(|| links.now()));
         links.receive(&mut |link, frame| {
             if H::SHARES_LINKS && class_of(frame) == Some(Class::Acyclic) {
                 acyclic.receive(link, frame, now);
@@ -141,7 +141,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         if !is_back {
             return None;
         }
-        lap.done(probe, CycleJob::Receive, || links.now());
+        timer.done(probe, CycleJob::Receive, || links.now());
         if P::AWAITS_FRAMES && !cyclic.exchange.awaits_frames() {
             probe.frames_are_in(links.now());
         }
@@ -222,7 +222,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         }
         let mut awaits_frames = P::AWAITS_FRAMES && self.cyclic.exchange.awaits_frames();
         loop {
-            let mut lap = Lap::begin::<P>(|| self.links.now());
+            let mut timer = JobTimer::begin::<P>(|| self.links.now());
             let Application { links, acyclic, cyclic, .. } = self;
             let mut left_at = None;
             let any = links.receive(&mut |link, frame| {
@@ -238,7 +238,7 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
             if let Some(left_at) = left_at {
                 self.note_round_trip(left_at, now);
             }
-            lap.done(probe, CycleJob::Receive, || self.links.now());
+            timer.done(probe, CycleJob::Receive, || self.links.now());
             if awaits_frames && !self.cyclic.exchange.awaits_frames() {
                 awaits_frames = false;
                 probe.frames_are_in(self.links.now());

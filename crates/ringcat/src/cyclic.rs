@@ -24,7 +24,7 @@ use crate::links::Links;
 use crate::observer::Observed;
 use crate::of_two::OfTwo;
 use crate::pace::{PaceNs, Trigger};
-use crate::probe::{CycleJob, CycleProbe, Lap};
+use crate::probe::{CycleJob, CycleProbe, JobTimer};
 use crate::process_data::{ProcessData, Rate};
 use crate::window::{Half, SHORTEST, Window};
 
@@ -368,7 +368,7 @@ impl Cyclic {
 
     /// Ends the cycle: sends the due domains.
     #[inline(always)]
-    pub fn end<P: CycleProbe>(&mut self, now: Instant, links: &mut impl Links, probe: &mut P, mut lap: Lap) {
+    pub fn end<P: CycleProbe>(&mut self, now: Instant, links: &mut impl Links, probe: &mut P, mut timer: JobTimer) {
         let is_alone = self.exchange.load_only_frame();
         if !is_alone {
             self.queue_due(now);
@@ -376,7 +376,7 @@ impl Cyclic {
         // Round trips, deadlines and readings of the reference clock count from the time at which the frames leave, not
         // from the beginning of the work.
         let now = links.now();
-        lap.done(probe, CycleJob::Queue, || now);
+        timer.done(probe, CycleJob::Queue, || now);
         let next = match self.trigger {
             Trigger::Time | Trigger::ReferenceClock { .. } => self.next_cycle,
             Trigger::FramesReturned { at_least } if at_least >= SHORTEST => self.earliest,
@@ -396,7 +396,7 @@ impl Cyclic {
             self.send(now, next, links);
         }
         self.publish();
-        lap.done(probe, CycleJob::Send, || links.now());
+        timer.done(probe, CycleJob::Send, || links.now());
         if P::TIMES_JOBS {
             probe.cycle_ended();
         }

@@ -8,7 +8,7 @@ use ringcat_engine::time::Instant;
 use crate::acyclic::AcyclicHalf;
 use crate::application::Application;
 use crate::links::Links;
-use crate::probe::{CycleJob, CycleProbe, Lap};
+use crate::probe::{CycleJob, CycleProbe, JobTimer};
 
 /// The parts of a cycle, each with its time for the probe. A cycle ends with [`ProbedParts::send`].
 #[derive(Debug)]
@@ -110,9 +110,9 @@ impl<L: Links, H: AcyclicHalf, P: CycleProbe> ProbedParts<'_, L, H, P> {
     }
 
     fn timed<R>(&mut self, job: CycleJob, run: impl FnOnce(&mut Application<L, H>) -> R) -> R {
-        let mut lap = Lap::begin::<P>(|| self.application.now());
+        let mut timer = JobTimer::begin::<P>(|| self.application.now());
         let result = run(self.application);
-        lap.done(self.probe, job, || self.application.now());
+        timer.done(self.probe, job, || self.application.now());
         result
     }
 }

@@ -208,13 +208,13 @@ impl CycleProbe for JobProbe {
 }
 
 /// The time since the last job, where jobs are timed.
-pub(crate) struct Lap(Instant);
+pub(crate) struct JobTimer(Instant);
 
-impl Lap {
+impl JobTimer {
     /// Begins a job.
     #[inline(always)]
-    pub fn begin<P: CycleProbe>(now: impl FnOnce() -> Instant) -> Lap {
-        Lap(if P::TIMES_JOBS { now() } else { Instant(0) })
+    pub fn begin<P: CycleProbe>(now: impl FnOnce() -> Instant) -> JobTimer {
+        JobTimer(if P::TIMES_JOBS { now() } else { Instant(0) })
     }
 
     /// A job has ended, and the next one begins.

@@ -52,14 +52,14 @@ fn states(device: &Device, others: &[Device]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::setup::Given;
+    use crate::setup::SetupOptions;
 
     // covers: daemon
     #[test]
     fn what_was_understood_is_said_with_lines_and_the_state_of_interfaces() {
         let text = "\nMASTER0_DEVICE=no-such\nRINGCAT_MODE=0664\nRINGCAT_MASTER1_SIM=/srv/a.toml\n";
         let conf = Conf::from_bytes(text.as_bytes()).expect("it is right");
-        let setup = Setup::new(Given::default(), conf.clone()).expect("it fits");
+        let setup = Setup::new(SetupOptions::default(), conf.clone()).expect("it fits");
         let found = lines(&conf, &setup, "/run/x");
         assert_eq!(found[0], "line 2: MASTER0_DEVICE: master 0 on interface no-such");
         assert!(found[3].starts_with("socket: /run/x, mode 0664: ") && found[3].ends_with("all others may read"));

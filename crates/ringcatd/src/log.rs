@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use ringcat_link::operator::{OperatorLines, Priority, lost_lines};
 
-/// Name of the program, in front of its own lines and in the journal.
+/// Name of the program, before its own lines and in the journal.
 const NAME: &str = "ringcatd";
 /// Lines that wait to be written.
 const MOST_WAITING: usize = 256;

@@ -10,7 +10,7 @@ use ringcatd::conf::Conf;
 use ringcatd::conf::place::Place;
 use ringcatd::log::{flush, say};
 use ringcatd::running;
-use ringcatd::setup::{Given, Setup};
+use ringcatd::setup::{Setup, SetupOptions};
 use ringcatd::{check, opener, segment_process};
 
 /// Drives EtherCAT segments while no application does, and hands them over to applications.
@@ -29,7 +29,7 @@ struct Arguments {
     #[arg(long)]
     check: bool,
     #[command(flatten)]
-    given: Given,
+    options: SetupOptions,
     /// The process of a simulated segment
     #[arg(long = "simulate", hide = true, value_name = "FILE")]
     simulate: Option<PathBuf>,
@@ -76,12 +76,12 @@ fn main() -> ExitCode {
 
 fn run(arguments: Arguments) -> Result<(), String> {
     let conf = arguments.conf.as_deref().map(Conf::read).transpose().map_err(|error| error.to_string())?;
-    running::run(&Setup::new(arguments.given, conf.unwrap_or_default())?)
+    running::run(&Setup::new(arguments.options, conf.unwrap_or_default())?)
 }
 
 /// Says what was understood.
 fn look(arguments: Arguments) -> Result<(), String> {
-    let is_named = arguments.conf.is_some() || !arguments.given.masters.is_empty();
+    let is_named = arguments.conf.is_some() || !arguments.options.masters.is_empty();
     let place = Place::find();
     let file = match arguments.conf {
         None if is_named => None,
@@ -95,7 +95,7 @@ fn look(arguments: Arguments) -> Result<(), String> {
         }
     };
     let conf = file.as_deref().map(Conf::read).transpose().map_err(|error| error.to_string())?.unwrap_or_default();
-    let setup = Setup::new(arguments.given, conf.clone())?;
+    let setup = Setup::new(arguments.options, conf.clone())?;
     let socket = match &setup.socket {
         Some(path) => path.display().to_string(),
         None => to_listen_at(|name| std::env::var_os(name))?.display().to_string(),

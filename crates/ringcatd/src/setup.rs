@@ -14,7 +14,7 @@ const STOP_LIMIT: u64 = 100;
 
 /// Options that say what the daemon does.
 #[derive(Args, Clone, Debug, Default)]
-pub struct Given {
+pub struct SetupOptions {
     /// A master and its links: 0=eth1, 0=eth1,eth2 (a ring), 0=sim:FILE (a simulated segment)
     ///
     /// An interface is named by its name or its address; ff:ff:ff:ff:ff:ff is the first one that nothing else uses. Can
@@ -88,28 +88,28 @@ impl Setup {
     ///
     /// # Errors
     /// What does not fit together, for the operator.
-    pub fn new(given: Given, conf: Conf) -> Result<Setup, String> {
+    pub fn new(options: SetupOptions, conf: Conf) -> Result<Setup, String> {
         let Conf { masters, up_down, own, understood: _ } = conf;
-        let masters = if given.masters.is_empty() { masters } else { given.masters };
+        let masters = if options.masters.is_empty() { masters } else { options.masters };
         check(&masters)?;
-        let mut safe_states = given.safe_states;
+        let mut safe_states = options.safe_states;
         safe_states.extend(own.safe_states);
         let is_known = |safe: &&SafeState| masters.iter().any(|it| it.master == safe.master);
         if let Some(safe) = safe_states.iter().find(|safe| !is_known(safe)) {
             return Err(format!("--safe-state names master {}, which does not exist", safe.master));
         }
-        let mode = given.mode.or(own.mode).unwrap_or(Rights::default().mode);
+        let mode = options.mode.or(own.mode).unwrap_or(Rights::default().mode);
         Ok(Setup {
             masters,
-            socket: given.socket.or(own.socket),
-            rights: Rights { group: given.group.or(own.group), mode },
-            stop_limit: given.stop_limit.or(own.stop_limit).unwrap_or(STOP_LIMIT),
+            socket: options.socket.or(own.socket),
+            rights: Rights { group: options.group.or(own.group), mode },
+            stop_limit: options.stop_limit.or(own.stop_limit).unwrap_or(STOP_LIMIT),
             safe_states,
-            has_eoe: !given.no_eoe && own.eoe.unwrap_or(true),
+            has_eoe: !options.no_eoe && own.eoe.unwrap_or(true),
             up_down,
             debug_level: own.debug_level.unwrap_or(0),
-            needs_backup: given.needs_backup || own.needs_backup,
-            ends_with_input: given.while_input_is_open,
+            needs_backup: options.needs_backup || own.needs_backup,
+            ends_with_input: options.while_input_is_open,
         })
     }
 
@@ -146,20 +146,21 @@ mod tests {
         let text = "MASTER0_DEVICE=eth0\nRINGCAT_MODE=0664\nRINGCAT_STOP_LIMIT=7\nRINGCAT_EOE=yes\n\
                     RINGCAT_MASTER0_SAFE_STATE=INIT\n";
         let conf = || Conf::from_bytes(text.as_bytes()).expect("it is right");
-        let setup = Setup::new(Given::default(), conf()).expect("it fits");
+        let setup = Setup::new(SetupOptions::default(), conf()).expect("it fits");
         assert_eq!((setup.rights.mode, setup.stop_limit, setup.has_eoe), (0o664, 7, true));
         let safe = "0=SAFEOP".parse().expect("it is right");
-        let given = Given { mode: Some(0o666), no_eoe: true, safe_states: vec![safe], ..Given::default() };
-        let setup = Setup::new(given, conf()).expect("it fits");
+        let options =
+            SetupOptions { mode: Some(0o666), no_eoe: true, safe_states: vec![safe], ..SetupOptions::default() };
+        let setup = Setup::new(options, conf()).expect("it fits");
         assert_eq!((setup.rights.mode, setup.stop_limit, setup.has_eoe), (0o666, 7, false));
         // The first that names a master counts.
         assert_eq!(setup.safe_states[0], safe);
         let masters = vec!["0=a".parse().expect("right"), "1=b,c".parse().expect("right")];
-        let setup = Setup::new(Given { masters, ..Given::default() }, Conf::default()).expect("it fits");
+        let setup = Setup::new(SetupOptions { masters, ..SetupOptions::default() }, Conf::default()).expect("it fits");
         assert_eq!((setup.rights, setup.stop_limit), (Rights::default(), STOP_LIMIT));
         assert_eq!(setup.others(0), [Device::Name("b".to_owned()), Device::Name("c".to_owned())]);
-        let unknown = Given { safe_states: vec!["4=INIT".parse().expect("right")], ..Given::default() };
+        let unknown = SetupOptions { safe_states: vec!["4=INIT".parse().expect("right")], ..SetupOptions::default() };
         assert!(Setup::new(unknown, conf()).expect_err("no master 4").contains("names master 4"));
-        assert!(Setup::new(Given::default(), Conf::default()).is_err());
+        assert!(Setup::new(SetupOptions::default(), Conf::default()).is_err());
     }
 }

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use ringcat::{CyclicThread, DomainId, DomainState, Instant, SubDeviceState};
 
-use super::beside::Beside;
 use super::live::{self, Live};
 use super::pace::Seen;
+use super::services::RunServices;
 use super::watched::Watched;
 use crate::access::WireLinks;
 use crate::ending::EndRequest;
@@ -31,7 +31,7 @@ pub struct Run {
     pub clocks: bool,
     /// Number of domains.
     pub domains: usize,
-    pub beside: Beside,
+    pub services: RunServices,
     /// Variables of a file.
     pub watched: Watched,
     pub recording: Recording,
@@ -44,7 +44,7 @@ impl Run {
             self.live.clear();
             print(shown);
         });
-        for words in self.beside.lines().into_iter().chain(self.recording.failure()) {
+        for words in self.services.lines().into_iter().chain(self.recording.failure()) {
             self.live.clear();
             warn(words);
         }

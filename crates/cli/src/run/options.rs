@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::beside::BesideArguments;
 use super::declared::DeclarationArguments;
 use super::junction::{self, Junctions, junctions};
+use super::services::ServiceArguments;
 use crate::access::AccessArguments;
 use crate::descriptions::EsiArgument;
 use crate::resend::ResendArgument;
@@ -76,7 +76,7 @@ pub struct RunArguments {
     #[arg(long, help_heading = "Segment")]
     pub enhanced_line_crossed: bool,
     #[command(flatten)]
-    pub beside: BesideArguments,
+    pub services: ServiceArguments,
     /// Take the time of each job of a cycle: receive, process, work, queue, send
     ///
     /// The clock is read before and after each job, which takes some time itself. Times count from the first cycle.

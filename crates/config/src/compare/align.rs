@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use ringcat_engine::config::{ConfigAddress, Marked, Resolution, SubDeviceConfig, resolve};
+use ringcat_engine::config::{ConfigAddress, Resolution, SubDeviceConfig, SubDevicesByIdentifier, resolve};
 use ringcat_engine::info::SubDeviceInfo;
 
 use super::alike::{Alike, DeviceKey, device, is_device, keys_of};
@@ -13,7 +13,7 @@ use crate::configuration::Configuration;
 /// Maximum number of compared pairs between the common begin and end; beyond it SubDevices are compared by position.
 const MAX_PAIRS: usize = 1 << 24;
 /// Maximum number of SubDevices with one identifier that are tried for a declaration.
-const MAX_TWINS: usize = 64;
+const MAX_IDENTICAL: usize = 64;
 
 /// The counterpart of a SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -224,13 +224,13 @@ fn by_mark(
     info_of: &mut [Option<usize>],
     taken: &mut [bool],
 ) {
-    let marked = Marked::new(found);
+    let by_identifier = SubDevicesByIdentifier::new(found);
     for (config, declared) in configs.iter().enumerate() {
         if info_of[config].is_some() {
             continue;
         }
-        let heads = marked.all(declared.address);
-        let places = heads.map(|head| head + declared.address.offset()).take(MAX_TWINS);
+        let heads = by_identifier.all(declared.address);
+        let places = heads.map(|head| head + declared.address.offset()).take(MAX_IDENTICAL);
         let free: Vec<usize> = places.filter(|info| taken.get(*info) == Some(&false)).collect();
         let own = free.iter().copied().find(|info| is_device(declared, stated.get(config), &found[*info]));
         if let Some(info) = own.or(free.first().copied()) {

@@ -173,7 +173,7 @@ impl<'a> PlacedModule<'a> {
         pdos.iter().map(shifted).collect()
     }
 
-    /// The name of one of its PDOs in a list of all PDOs of the device: that of the module in front of its own.
+    /// The name of one of its PDOs in a list of all PDOs of the device: that of the module before its own.
     pub fn pdo_name(&self, pdo: &Pdo, language: u32) -> String {
         let (module, own) = (self.module.kind.trim(), pdo.name.in_language(language).trim());
         if own.is_empty() { module.to_owned() } else { format!("{module}/{own}") }

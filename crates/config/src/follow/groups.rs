@@ -7,7 +7,7 @@ use ringcat_engine::config::{ConfigAddress, SubDeviceConfig};
 use ringcat_engine::main_device::{GroupId, Required};
 
 use super::bus::Bus;
-use super::identity::{Mark, group_marks};
+use super::identity::{ComparedValue, compared_values_of_group};
 use super::messages::{contradiction, label};
 use crate::declared_twice::declared_twice;
 use crate::eni::{Eni, EniError, HotConnect, Place, quoted};
@@ -39,13 +39,13 @@ pub(super) fn follow(eni: &Eni, bus: &Bus, configs: &mut [SubDeviceConfig]) -> R
 
 /// The address of the head of a group.
 fn head(eni: &Eni, index: usize, group: &HotConnect) -> Result<ConfigAddress, EniError> {
-    let marks = group_marks(&group.identify);
+    let compared_values = compared_values_of_group(&group.identify);
     let refused = |place: Place, expected: &str, got: String, hint: &str| {
         let what = format!("identification of the hot connect group {}", quoted(&group.name));
         contradiction(eni, index, place, what, expected, got, hint)
     };
     let addresses: Vec<(ConfigAddress, Place)> =
-        marks.iter().filter_map(|(mark, place)| Some((address(*mark)?, *place))).collect();
+        compared_values.iter().filter_map(|(compared, place)| Some((address(*compared)?, *place))).collect();
     match addresses[..] {
         [] => {
             let expected = "an IdentifyCmd that compares the alias (register 0x0012 or EEPROM word 4), the \
@@ -62,13 +62,13 @@ fn head(eni: &Eni, index: usize, group: &HotConnect) -> Result<ConfigAddress, En
     }
 }
 
-fn address(mark: Mark) -> Option<ConfigAddress> {
+fn address(compared: ComparedValue) -> Option<ConfigAddress> {
     let offset = 0;
-    match mark {
-        Mark::Alias(alias) => Some(ConfigAddress::Alias { alias, offset }),
-        Mark::DataWord { register, value } => Some(ConfigAddress::DataWord { register, value, offset }),
-        Mark::Identification(value) => Some(ConfigAddress::Identification { value, offset }),
-        Mark::Eeprom { .. } | Mark::EepromWord { .. } => None,
+    match compared {
+        ComparedValue::Alias(alias) => Some(ConfigAddress::Alias { alias, offset }),
+        ComparedValue::DataWord { register, value } => Some(ConfigAddress::DataWord { register, value, offset }),
+        ComparedValue::Identification(value) => Some(ConfigAddress::Identification { value, offset }),
+        ComparedValue::Eeprom { .. } | ComparedValue::EepromWord { .. } => None,
     }
 }
 

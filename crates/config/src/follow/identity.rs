@@ -10,7 +10,7 @@ use crate::eni::{EcatCommand, Eni, EniError, Place, Target, Transition};
 
 /// The value that a command compares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Mark {
+pub(super) enum ComparedValue {
     /// Two words of the EEPROM from this address.
     Eeprom {
         /// Word address.
@@ -51,7 +51,7 @@ pub(crate) const LOW_WORD: u32 = 0x0000_FFFF;
 pub(crate) const HIGH_WORD: u32 = 0xFFFF_0000;
 
 /// The values that commands compare, in order, and whether all bits are compared.
-pub(super) fn marks(commands: &[EcatCommand]) -> Vec<(Mark, bool, Place)> {
+pub(super) fn compared_values(commands: &[EcatCommand]) -> Vec<(ComparedValue, bool, Place)> {
     let mut word = None;
     let mut found = Vec::new();
     for command in commands {
@@ -73,20 +73,28 @@ pub(super) fn marks(commands: &[EcatCommand]) -> Vec<(Mark, bool, Place)> {
                 let (pairs, rest) = validate.data.as_chunks();
                 for (number, value) in (0_u32..).zip(pairs) {
                     let word = word.unwrap_or_default().wrapping_add(2 * number);
-                    found.push((Mark::Eeprom { word, value: u32::from_le_bytes(*value) }, whole, command.place));
+                    found.push((
+                        ComparedValue::Eeprom { word, value: u32::from_le_bytes(*value) },
+                        whole,
+                        command.place,
+                    ));
                 }
                 if let [low, high, ..] = rest {
                     let word = word.unwrap_or_default().wrapping_add(2 * pairs.len() as u32);
-                    let mark = Mark::EepromWord { word, value: u16::from_le_bytes([*low, *high]) };
-                    found.push((mark, whole, command.place));
+                    let compared = ComparedValue::EepromWord { word, value: u16::from_le_bytes([*low, *high]) };
+                    found.push((compared, whole, command.place));
                 }
             }
-            map::STATION_ALIAS => found.extend(first_word.map(|alias| (Mark::Alias(alias), whole, command.place))),
+            map::STATION_ALIAS => {
+                found.extend(first_word.map(|alias| (ComparedValue::Alias(alias), whole, command.place)))
+            }
             map::AL_STATUS_CODE => {
-                found.extend(first_word.map(|id| (Mark::Identification(id), whole, command.place)));
+                found.extend(first_word.map(|id| (ComparedValue::Identification(id), whole, command.place)));
             }
             word if MEMORY.contains(&word.0) && validate.data.len() == 2 => {
-                found.extend(first_word.map(|value| (Mark::DataWord { register: word, value }, whole, command.place)));
+                found.extend(
+                    first_word.map(|value| (ComparedValue::DataWord { register: word, value }, whole, command.place)),
+                );
             }
             _ => {}
         }
@@ -105,13 +113,13 @@ pub(super) fn expected(eni: &Eni, index: usize, complete: bool) -> Result<Expect
         return Ok(expected);
     }
     let mut revision = (0_u32, 0_u32);
-    let identify = subdevice.hot_connect.iter().flat_map(|group| marks(&group.identify));
-    for (mark, whole, place) in marks(&subdevice.init_commands).into_iter().chain(identify) {
-        if let Some((mask, value)) = part_of_revision(&mark).filter(|_| whole) {
+    let identify = subdevice.hot_connect.iter().flat_map(|group| compared_values(&group.identify));
+    for (compared, whole, place) in compared_values(&subdevice.init_commands).into_iter().chain(identify) {
+        if let Some((mask, value)) = part_of_revision(&compared).filter(|_| whole) {
             revision = (revision.0 & !mask | value, revision.1 | mask);
             continue;
         }
-        let Mark::Eeprom { word, value } = mark else { continue };
+        let ComparedValue::Eeprom { word, value } = compared else { continue };
         let (field, what, said) = match word {
             WORD_VENDOR => (&mut expected.vendor_id, "the compared vendor id", subdevice.vendor_id),
             WORD_PRODUCT => (&mut expected.product_code, "the compared product code", subdevice.product_code),
@@ -136,11 +144,13 @@ pub(super) fn expected(eni: &Eni, index: usize, complete: bool) -> Result<Expect
 }
 
 /// The bits of a revision that are compared, and their value: the whole one or a word of it (protocol ES-121).
-fn part_of_revision(mark: &Mark) -> Option<(u32, u32)> {
-    match *mark {
-        Mark::Eeprom { word: WORD_REVISION, value } => Some((u32::MAX, value)),
-        Mark::EepromWord { word: WORD_REVISION, value } => Some((LOW_WORD, value.into())),
-        Mark::EepromWord { word, value } if word == WORD_REVISION + 1 => Some((HIGH_WORD, u32::from(value) << 16)),
+fn part_of_revision(compared: &ComparedValue) -> Option<(u32, u32)> {
+    match *compared {
+        ComparedValue::Eeprom { word: WORD_REVISION, value } => Some((u32::MAX, value)),
+        ComparedValue::EepromWord { word: WORD_REVISION, value } => Some((LOW_WORD, value.into())),
+        ComparedValue::EepromWord { word, value } if word == WORD_REVISION + 1 => {
+            Some((HIGH_WORD, u32::from(value) << 16))
+        }
         _ => None,
     }
 }
@@ -150,13 +160,13 @@ fn part_of_revision(mark: &Mark) -> Option<(u32, u32)> {
 pub(super) fn is_sent(command: &EcatCommand, address: Option<&EcatCommand>) -> bool {
     let Target::Register { ado, .. } = command.datagram.target else { return false };
     let pair: Vec<EcatCommand> = address.into_iter().chain([command]).cloned().collect();
-    let is_whole = |(mark, whole, _): &(Mark, bool, Place)| {
+    let is_whole = |(compared, whole, _): &(ComparedValue, bool, Place)| {
         let known = [WORD_VENDOR, WORD_PRODUCT, WORD_SERIAL];
-        let is_number = matches!(mark, Mark::Eeprom { word, .. } if known.contains(word));
-        *whole && (is_number || part_of_revision(mark).is_some())
+        let is_number = matches!(compared, ComparedValue::Eeprom { word, .. } if known.contains(word));
+        *whole && (is_number || part_of_revision(compared).is_some())
     };
     let Some(validate) = command.validate.as_ref().filter(|_| ado == map::SII_DATA) else { return false };
-    validate.data.len() % 2 == 1 || !marks(&pair).iter().all(is_whole)
+    validate.data.len() % 2 == 1 || !compared_values(&pair).iter().all(is_whole)
 }
 
 /// Whether a command sets the EEPROM address of the next read.
@@ -167,18 +177,20 @@ pub(super) fn is_eeprom_address(command: &EcatCommand) -> bool {
 
 /// The first two different aliases, identifications or data words that the commands of a group compare; an alias may be
 /// read from the EEPROM or from its register.
-pub(super) fn group_marks(commands: &[EcatCommand]) -> Vec<(Mark, Place)> {
-    let mut found: Vec<(Mark, Place)> = Vec::new();
-    for (mark, whole, place) in marks(commands) {
-        let mark = match mark {
-            Mark::Eeprom { word: WORD_ALIAS, value } => Mark::Alias(value as u16),
-            Mark::EepromWord { word: WORD_ALIAS, value } if whole => Mark::Alias(value),
-            Mark::Eeprom { .. } | Mark::EepromWord { .. } => continue,
-            Mark::Alias(_) | Mark::Identification(_) | Mark::DataWord { .. } if whole => mark,
-            Mark::Alias(_) | Mark::Identification(_) | Mark::DataWord { .. } => continue,
+pub(super) fn compared_values_of_group(commands: &[EcatCommand]) -> Vec<(ComparedValue, Place)> {
+    let mut found: Vec<(ComparedValue, Place)> = Vec::new();
+    for (compared, whole, place) in compared_values(commands) {
+        let compared = match compared {
+            ComparedValue::Eeprom { word: WORD_ALIAS, value } => ComparedValue::Alias(value as u16),
+            ComparedValue::EepromWord { word: WORD_ALIAS, value } if whole => ComparedValue::Alias(value),
+            ComparedValue::Eeprom { .. } | ComparedValue::EepromWord { .. } => continue,
+            ComparedValue::Alias(_) | ComparedValue::Identification(_) | ComparedValue::DataWord { .. } if whole => {
+                compared
+            }
+            ComparedValue::Alias(_) | ComparedValue::Identification(_) | ComparedValue::DataWord { .. } => continue,
         };
-        if mark != Mark::Alias(0) && found.iter().all(|(known, _)| *known != mark) {
-            found.push((mark, place));
+        if compared != ComparedValue::Alias(0) && found.iter().all(|(known, _)| *known != compared) {
+            found.push((compared, place));
         }
         if found.len() == 2 {
             break;

@@ -212,7 +212,7 @@ fn a_disabled_request_of_a_file_ends_the_transfer_before_it() {
     assert!(!has_notice(&quiet, &["FoE/InitCmd"]), "{:#?}", notices(&quiet));
 }
 
-/// Commands of the MainDevice in front of the first SubDevice.
+/// Commands of the MainDevice before the first SubDevice.
 fn with_bus(commands: &str) -> ringcat_config::Configuration {
     let at = SMALL.find("<Slave>").unwrap();
     let (head, rest) = SMALL.split_at(at);

@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 
 use ringcat_wire::address::RegisterAddress;
 
-use super::matching::{Marked, at_place, missing};
+use super::matching::{SubDevicesByIdentifier, at_place, missing};
 use super::resolution::Resolution;
 use super::{ConfigAddress, SubDeviceConfig};
 use crate::declared::GroupId;
@@ -63,10 +63,10 @@ pub fn groups<'a>(configs: impl IntoIterator<Item = &'a SubDeviceConfig>) -> Vec
 pub(super) fn find(
     configs: &[SubDeviceConfig],
     members: &[usize],
-    (infos, marked): (&[&SubDeviceInfo], &Marked),
+    (infos, by_identifier): (&[&SubDeviceInfo], &SubDevicesByIdentifier),
     resolutions: &mut [Option<Resolution>],
 ) {
-    let head = members.first().map_or(Ok(None), |head| marked.find(configs[*head].address, infos));
+    let head = members.first().map_or(Ok(None), |head| by_identifier.find(configs[*head].address, infos));
     let mut intact = true;
     for (offset, config) in members.iter().enumerate() {
         let resolution = match head {

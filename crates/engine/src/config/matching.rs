@@ -69,19 +69,19 @@ impl Identifier {
 
 /// The SubDevices of a scan by their aliases, identifications and data words.
 #[derive(Clone, Debug)]
-pub struct Marked {
+pub struct SubDevicesByIdentifier {
     /// In the order of identifiers, then of the SubDevices.
     identifiers: Vec<(Identifier, usize)>,
 }
 
-impl Marked {
+impl SubDevicesByIdentifier {
     /// Reads the identifiers of the SubDevices of a scan.
-    pub fn new(infos: &[impl Borrow<SubDeviceInfo>]) -> Marked {
+    pub fn new(infos: &[impl Borrow<SubDeviceInfo>]) -> SubDevicesByIdentifier {
         let indexed = infos.iter().map(Borrow::borrow).enumerate();
         let mut identifiers: Vec<(Identifier, usize)> =
             indexed.flat_map(|(at, info)| Identifier::all_of(info).map(move |identifier| (identifier, at))).collect();
         identifiers.put_in_order();
-        Marked { identifiers }
+        SubDevicesByIdentifier { identifiers }
     }
 
     /// Indices of all SubDevices with the alias, identification or data word of an address, in their order. An

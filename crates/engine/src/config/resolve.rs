@@ -8,7 +8,7 @@ use core::fmt;
 use ringcat_wire::address::Position;
 
 use super::groups::{self, groups};
-use super::matching::{Marked, at_place, missing_error};
+use super::matching::{SubDevicesByIdentifier, at_place, missing_error};
 use super::resolution::{ConfigError, Resolution};
 use super::steps::step;
 use super::{ConfigAddress, SubDeviceConfig};
@@ -63,10 +63,10 @@ pub fn duplicate_aliases(infos: &[SubDeviceInfo]) -> Vec<DuplicateAlias> {
 pub fn resolve(configs: &[SubDeviceConfig], infos: &[impl Borrow<SubDeviceInfo>]) -> Vec<Resolution> {
     let infos: Vec<&SubDeviceInfo> = infos.iter().map(Borrow::borrow).collect();
     let infos = &infos[..];
-    let marked = Marked::new(infos);
+    let by_identifier = SubDevicesByIdentifier::new(infos);
     let mut resolutions = vec![None; configs.len()];
     for members in groups(configs) {
-        groups::find(configs, &members, (infos, &marked), &mut resolutions);
+        groups::find(configs, &members, (infos, &by_identifier), &mut resolutions);
     }
     let mut is_grouped = vec![false; infos.len()];
     for resolution in &resolutions {
@@ -92,7 +92,7 @@ pub fn resolve(configs: &[SubDeviceConfig], infos: &[impl Borrow<SubDeviceInfo>]
         });
     }
     for (config, resolution) in resolutions.iter_mut().enumerate().filter(|(_, resolution)| resolution.is_none()) {
-        *resolution = Some(by_mark(configs, infos, &marked, config));
+        *resolution = Some(resolve_identifier(configs, infos, &by_identifier, config));
     }
     claim(resolutions.into_iter().flatten().collect(), infos)
 }
@@ -178,9 +178,14 @@ impl Absences {
 }
 
 /// Finds a SubDevice by alias or identification, or by its exact position with alias 0.
-fn by_mark(configs: &[SubDeviceConfig], infos: &[&SubDeviceInfo], marked: &Marked, config: usize) -> Resolution {
+fn resolve_identifier(
+    configs: &[SubDeviceConfig],
+    infos: &[&SubDeviceInfo],
+    by_identifier: &SubDevicesByIdentifier,
+    config: usize,
+) -> Resolution {
     let address = configs[config].address;
-    match marked.find(address, infos) {
+    match by_identifier.find(address, infos) {
         Ok(place) => at_place(configs, infos, config, place.map(|place| place + address.offset())),
         Err(error) => Resolution::Failed { config, error },
     }

@@ -32,7 +32,7 @@ pub(crate) enum Notice {
         total: usize,
     },
     /// What was read of an SII or a dictionary was odd: its reader has worked around it.
-    SiiOddity {
+    SiiWarning {
         /// Position.
         position: Position,
         /// The fault.
@@ -105,7 +105,7 @@ impl From<Notice> for Event {
         match notice {
             Notice::Counted { main, redundant } => Event::Counted { main, redundant },
             Notice::ScanProgress { done, total } => Event::ScanProgress { done, total },
-            Notice::SiiOddity { position, what } => Event::SiiOddity { position, what },
+            Notice::SiiWarning { position, what } => Event::SiiWarning { position, what },
             Notice::Resumed { subdevices, in_state, differs } => Event::Resumed { subdevices, in_state, differs },
             Notice::ConversationCut { position, protocol } => Event::ConversationCut { position, protocol },
             Notice::CannotDisconnect { link } => Event::CannotDisconnect { link },

@@ -84,7 +84,7 @@ impl Event {
             | Event::ScanFailed { .. }
             | Event::SegmentChanged { .. }
             | Event::Resumed { .. }
-            | Event::SiiOddity { .. }
+            | Event::SiiWarning { .. }
             | Event::DuplicateAlias { .. }
             | Event::Unexpected { .. }
             | Event::Mismatch { .. }
@@ -98,7 +98,7 @@ impl Event {
             | Event::JunctionUnknown { .. }
             | Event::JunctionsBlocked { .. }
             | Event::CannotDisconnect { .. }
-            | Event::CablingOddity { .. }
+            | Event::CablingWarning { .. }
             | Event::CableErrors { .. }
             | Event::Moved { .. } => Subject::Cabling,
             Event::RingOpened { .. }
@@ -119,7 +119,7 @@ impl Event {
             | Event::Lost { .. }
             | Event::Returned { .. }
             | Event::ConfigurationFailed { .. }
-            | Event::PlanOddity { .. }
+            | Event::DeclarationWarning { .. }
             | Event::GroupJoined { .. }
             | Event::GroupLeft { .. } => Subject::States,
             Event::StartupRead { .. } => Subject::States,

@@ -425,7 +425,7 @@ impl Clocks {
         self.ports_changed = ports_changed;
         if seen.spread_wkc > 0 && seen.monitors {
             // While no time is distributed, differences come from a frame on another path. A steered reference and the
-            // clocks in front of a reference show the jitter of the host; the supervisor checks each of the other
+            // clocks upstream of a reference show the jitter of the host; the supervisor checks each of the other
             // clocks then.
             let is_steered = self.references.leader().1.is_some() || board.clocks.shows_host_jitter();
             let is_conclusive = !is_held && !is_steered;

@@ -29,11 +29,11 @@ use crate::info::SubDeviceInfo;
 use crate::layout::{Layout, Rules};
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::reconcile::reconcile;
-use crate::procedures::shared_segment::{Beside, SharedSegment};
+use crate::procedures::shared_segment::{SegmentData, SharedSegment};
 use crate::queue::{Producer, queue};
 use crate::ring_status::{CableErrors, cables};
 use crate::segment::clocks::Clocks;
-use crate::segment::findings::{DeclarationFinding, Oddity};
+use crate::segment::findings::{DeclarationFinding, SettingFinding};
 use crate::segment::{Cabling, Declared, Found, Observation, SubDevices, stations_by_position, type_of};
 use crate::time::Instant;
 use crate::topology::Topology;
@@ -87,7 +87,7 @@ impl MainDevice {
         let cables = cables.into_iter().map(|cable| (cable, CableErrors::default())).collect();
         let mailboxes = (0..count).map(|index| self.new_mailbox(SubDeviceId(index))).collect();
         let statistics = ErrorStatistics::new(&bus, count, self.statistics_period);
-        let beside = Beside { mailboxes, cache: self.cache.clone(), statistics };
+        let data = SegmentData { mailboxes, cache: self.cache.clone(), statistics };
         let declared = Box::new(Declared {
             subdevices,
             layout,
@@ -97,7 +97,7 @@ impl MainDevice {
             carriers: bus.carriers(),
             board: board.clone(),
         });
-        let segment = self.segment.with_application(&bus, board.clone(), beside);
+        let segment = self.segment.with_application(&bus, board.clone(), data);
         segment.observe(Observation::Activated(declared));
         self.supervisor.attach(board);
         self.supervisor.attach_bell(self.requests.bell().clone());
@@ -131,8 +131,8 @@ impl MainDevice {
     /// Reports that the SubDevice declared as the reference clock has no clock.
     fn report_reference(&self, replaced: Option<(SubDeviceId, Option<Position>)>) {
         let Some((subdevice, instead)) = replaced else { return };
-        let oddity = Oddity::Reference { instead };
-        self.segment.observe(Observation::Compared(DeclarationFinding::Oddity(subdevice, oddity)));
+        let warning = SettingFinding::Reference { instead };
+        self.segment.observe(Observation::Compared(DeclarationFinding::SettingFinding(subdevice, warning)));
     }
 
     /// The cyclic half, with images in memory of the application where it is declared.

@@ -59,7 +59,7 @@ pub(crate) async fn complete_in_background(bus: Bus, segment: SharedSegment) {
         if attempt == ATTEMPTS {
             for (position, error) in failed {
                 let what = alloc::format!("the rest of the SII, with its names, cannot be read: {error}");
-                bus.notice(Notice::SiiOddity { position, what });
+                bus.notice(Notice::SiiWarning { position, what });
             }
             return;
         }

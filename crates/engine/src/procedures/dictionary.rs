@@ -75,7 +75,7 @@ fn is_interrupted(error: &SdoError) -> bool {
 /// Says why a dictionary cannot be read.
 pub(super) fn report_unreadable(bus: &Bus, info: &SubDeviceInfo, reason: &str) {
     let what = alloc::format!("the PDOs in its dictionary cannot be read: {reason}");
-    bus.notice(Notice::SiiOddity { position: info.position, what });
+    bus.notice(Notice::SiiWarning { position: info.position, what });
 }
 
 /// Reads dictionaries after a scan, and updates it. Each SubDevice is brought to PREOP, and back to INIT.
@@ -96,7 +96,7 @@ pub(super) async fn complete(bus: &Bus, scan: &mut Scan, which: ReadPdos) {
         match result {
             Dictionary::Held(held) => {
                 for warning in info.take_dictionary(&held) {
-                    bus.notice(Notice::SiiOddity { position, what: warning.to_string() });
+                    bus.notice(Notice::SiiWarning { position, what: warning.to_string() });
                 }
             }
             Dictionary::Unreadable(reason) => report_unreadable(bus, info, &reason),

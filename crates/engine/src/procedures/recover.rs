@@ -19,7 +19,7 @@ use super::frame_limit;
 use super::read_again::read_again;
 use super::shared_segment::SharedSegment;
 use super::sii;
-use super::unassigned::{Mark, has_identity, mark, take_away};
+use super::unassigned::{MappingEvidence, has_identity, mapping_evidence, take_away};
 use crate::event::Subject;
 use crate::mail::MailboxError;
 use crate::mail::aoe::AoeError;
@@ -346,10 +346,10 @@ async fn is_the_lost_one(
     index: usize,
     station: StationAddress,
 ) -> Result<bool, BusError> {
-    Ok(match mark(bus, segment, index, station).await? {
-        Mark::Borne => true,
-        Mark::Missing | Mark::Unmapped => false,
-        Mark::None => has_identity(bus, segment, index, station).await,
+    Ok(match mapping_evidence(bus, segment, index, station).await? {
+        MappingEvidence::Held => true,
+        MappingEvidence::Missing | MappingEvidence::Unmapped => false,
+        MappingEvidence::None => has_identity(bus, segment, index, station).await,
     })
 }
 

@@ -387,7 +387,7 @@ pub(super) async fn ask(
         Err(error) if error.is_passing() => return Err(ScanError::Sii { position, error }),
         // A broken EEPROM fails only its own SubDevice.
         Err(error) => {
-            bus.notice(Notice::SiiOddity { position, what: error.to_string() });
+            bus.notice(Notice::SiiWarning { position, what: error.to_string() });
             let contents = SiiContents::unreadable();
             return Ok(Identified { contents, identification: None, pdo_source: PdoSource::Outdated });
         }

@@ -60,7 +60,7 @@ pub struct SharedSegment {
 
 /// Data beside the model.
 #[derive(Debug)]
-pub struct Beside {
+pub struct SegmentData {
     /// Mailboxes of the members, by index.
     pub mailboxes: Vec<Mailbox>,
     /// SII contents read before.
@@ -77,8 +77,8 @@ impl SharedSegment {
 
     /// The same model, with an application that is activated next. Procedures that run without an application and
     /// continue beside it share procedures to be started, and changes wake them as well.
-    pub fn with_application(&self, bus: &Bus, board: Arc<Board>, beside: Beside) -> SharedSegment {
-        let Beside { mailboxes, cache, statistics } = beside;
+    pub fn with_application(&self, bus: &Bus, board: Arc<Board>, data: SegmentData) -> SharedSegment {
+        let SegmentData { mailboxes, cache, statistics } = data;
         // No broadcast follows.
         self.board.post_end();
         let eeproms = EepromTurns::new(bus);

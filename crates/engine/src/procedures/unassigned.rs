@@ -20,7 +20,7 @@ pub(super) use self::address::give;
 pub(super) use self::address::take_away;
 pub(super) use self::address::view;
 use self::doubles::restore;
-pub(super) use self::doubles::{Mark, has_identity, mark};
+pub(super) use self::doubles::{MappingEvidence, has_identity, mapping_evidence};
 pub(super) use self::quiet::level;
 use self::rescan::ports_of;
 use super::data_words::read_declared;

@@ -67,12 +67,12 @@ pub enum DeclarationFinding {
     /// Findings about the cabling.
     Cabling(CablingFindings),
     /// A setting that a SubDevice may not follow.
-    Oddity(SubDeviceId, Oddity),
+    SettingFinding(SubDeviceId, SettingFinding),
 }
 
 /// A setting in a declaration that a SubDevice may not follow.
 #[derive(Clone, Debug)]
-pub enum Oddity {
+pub enum SettingFinding {
     /// A rule that it cannot follow.
     Plan(PlanWarning),
     /// A declared ring is not watched: it has an end at this SubDevice, which is not there.

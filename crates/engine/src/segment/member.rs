@@ -62,23 +62,23 @@ pub struct Member {
     /// Requests for another attempt without a further pause.
     pub retries: u32,
     /// Differences that were reported.
-    pub(super) oddities: Oddities,
+    pub(super) reported_warnings: ReportedWarnings,
 }
 
 /// Maximum number of differences that are kept: more than a SubDevice has SyncManagers.
-const MAX_ODDITIES: usize = 32;
+const MAX_REPORTED_WARNINGS: usize = 32;
 
 /// Differences between a declaration and a SubDevice: each attempt finds them again, and each is reported once.
 #[derive(Debug, Default)]
-pub(super) struct Oddities(VecDeque<String>);
+pub(super) struct ReportedWarnings(VecDeque<String>);
 
-impl Oddities {
+impl ReportedWarnings {
     /// Whether a difference is not yet reported; it is then kept. The oldest are dropped.
     pub fn is_new(&mut self, what: &str) -> bool {
         if self.0.iter().any(|other| other == what) {
             return false;
         }
-        if self.0.len() == MAX_ODDITIES {
+        if self.0.len() == MAX_REPORTED_WARNINGS {
             self.0.pop_front();
         }
         self.0.push_back(what.into());
@@ -196,7 +196,7 @@ impl Member {
             mistaken: Mistaken::default(),
             repair: Repair::default(),
             retries: 0,
-            oddities: Oddities::default(),
+            reported_warnings: ReportedWarnings::default(),
         }
     }
 }

@@ -16,7 +16,6 @@ use super::crossings::LineCheck;
 use super::disturbance::Wanted;
 use super::effect::Shown;
 use super::findings::{DeclarationFinding, ScanFinding};
-use super::given::Given;
 use super::idle::IdleObservation;
 use super::key::SubDeviceKey;
 use super::link_order::LinkObservation;
@@ -27,6 +26,7 @@ use super::reading::Reading;
 use super::round_result::RoundResult;
 use super::scan::{Found, Scan};
 use super::seen::Seen;
+use super::temporary_address::TemporaryAddress;
 use super::undeclared::UndeclaredObservation;
 use super::versions::Versions;
 use super::view::View;
@@ -118,7 +118,7 @@ pub enum MemberFinding<'a> {
     /// It cannot be read again; the reason.
     NotReadAgain(String),
     /// What it refuses differs from its own description.
-    Oddity(String),
+    SettingFinding(String),
     /// Something was found about the PDOs in its dictionary.
     Pdos(PdoFinding<'a>),
 }
@@ -273,7 +273,7 @@ pub enum Observation<'a> {
         /// Positions of the SubDevices with these addresses.
         view: &'a View,
         /// The addresses.
-        given: &'a [Given],
+        given: &'a [TemporaryAddress],
     },
     /// A search for SubDevices without a known address has ended; the reason if not all are known. A failure is refused
     /// if station addresses have changed since, or SubDevices were out of reach on purpose: it is one of another

@@ -191,13 +191,13 @@ impl SubDevices {
     }
 
     /// A member has left that had answered in this round. Those without a declaration that were there are others.
-    pub(super) fn tell_apart(&mut self, index: usize, answered: u64) {
-        self.departed.iter_mut().for_each(|(_, presence)| presence.tell_apart(index, answered));
+    pub(super) fn exclude_from_place(&mut self, index: usize, answered: u64) {
+        self.departed.iter_mut().for_each(|(_, presence)| presence.exclude_from_place(index, answered));
         for (_, knowledge, it) in self.all_unassigned_mut() {
             if it.reported && knowledge.info().is_some() {
                 it.presence.is_beside(index);
             }
-            it.presence.tell_apart(index, answered);
+            it.presence.exclude_from_place(index, answered);
         }
     }
 

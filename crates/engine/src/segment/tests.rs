@@ -89,8 +89,8 @@ fn choices() -> Choices {
 }
 
 /// An address that was given to a SubDevice with another one.
-fn given(station: StationAddress) -> Given {
-    Given { station, before: StationAddress(0x7777) }
+fn given(station: StationAddress) -> TemporaryAddress {
+    TemporaryAddress { station, before: StationAddress(0x7777) }
 }
 
 /// SubDevices with these station addresses and product codes.

@@ -29,7 +29,7 @@ pub(super) struct Presence {
 
 impl Presence {
     /// A member has left that had answered in this round.
-    pub fn tell_apart(&mut self, index: usize, answered: u64) {
+    pub fn exclude_from_place(&mut self, index: usize, answered: u64) {
         if self.since.is_some_and(|since| since <= answered) {
             self.is_beside(index);
         }

@@ -12,7 +12,7 @@ use crate::pcapng::Direction;
 
 /// Bytes of a word.
 const WORD: usize = size_of::<u64>();
-/// Words in front of a frame: interface, direction and lengths; time.
+/// Words before a frame: interface, direction and lengths; time.
 const HEAD: usize = 2;
 /// Longer frames are truncated; jumbo frames are shorter.
 pub const LONGEST: usize = 0xFFFF;

@@ -16,20 +16,20 @@ enum Alarm {
 
 /// Watches for an ACTIVE.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Lookout {
+pub(crate) struct ActiveMonitor {
     /// Time of the last process data of an ACTIVE, or of the beginning of this watch.
     there_at: Instant,
     alarm: Alarm,
 }
 
-impl Lookout {
-    pub fn new(now: Instant) -> Lookout {
-        Lookout { there_at: now, alarm: Alarm::Quiet }
+impl ActiveMonitor {
+    pub fn new(now: Instant) -> ActiveMonitor {
+        ActiveMonitor { there_at: now, alarm: Alarm::Quiet }
     }
 
     /// This MainDevice is ACTIVE itself.
     pub fn is_active(&mut self, now: Instant) {
-        *self = Lookout::new(now);
+        *self = ActiveMonitor::new(now);
     }
 
     /// This MainDevice is INACTIVE. `seen_at`: time of the last process data of the ACTIVE, if there was any.
@@ -59,16 +59,16 @@ mod tests {
     // covers: REQ032, 9.11, standby
     #[test]
     fn a_missing_active_and_its_return_are_each_reported_once() {
-        let mut lookout = Lookout::new(at(100));
-        assert_eq!(lookout.note(None, LIMIT, at(114)), None);
-        assert_eq!(lookout.note(None, LIMIT, at(115)), Some(CyclicStandbyEvent::NoActive(LIMIT)), "it never came");
-        assert_eq!(lookout.note(None, LIMIT, at(500)), None);
-        assert_eq!(lookout.note(Some(at(501)), LIMIT, at(502)), Some(CyclicStandbyEvent::ActiveIsBack));
-        assert_eq!(lookout.note(Some(at(510)), LIMIT, at(524)), None);
+        let mut monitor = ActiveMonitor::new(at(100));
+        assert_eq!(monitor.note(None, LIMIT, at(114)), None);
+        assert_eq!(monitor.note(None, LIMIT, at(115)), Some(CyclicStandbyEvent::NoActive(LIMIT)), "it never came");
+        assert_eq!(monitor.note(None, LIMIT, at(500)), None);
+        assert_eq!(monitor.note(Some(at(501)), LIMIT, at(502)), Some(CyclicStandbyEvent::ActiveIsBack));
+        assert_eq!(monitor.note(Some(at(510)), LIMIT, at(524)), None);
         // When the links are lost the time of the last frame is unknown.
-        assert_eq!(lookout.note(None, LIMIT, at(526)), Some(CyclicStandbyEvent::NoActive(Duration::from_millis(16))));
-        lookout.is_active(at(600));
-        assert_eq!(lookout.note(None, LIMIT, at(610)), None, "its own time as ACTIVE counts");
-        assert_eq!(lookout.note(None, LIMIT, at(615)), Some(CyclicStandbyEvent::NoActive(LIMIT)));
+        assert_eq!(monitor.note(None, LIMIT, at(526)), Some(CyclicStandbyEvent::NoActive(Duration::from_millis(16))));
+        monitor.is_active(at(600));
+        assert_eq!(monitor.note(None, LIMIT, at(610)), None, "its own time as ACTIVE counts");
+        assert_eq!(monitor.note(None, LIMIT, at(615)), Some(CyclicStandbyEvent::NoActive(LIMIT)));
     }
 }

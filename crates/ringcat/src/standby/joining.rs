@@ -11,7 +11,7 @@ use ringcat_engine::role::{RoleControl, RoleRequest};
 use ringcat_engine::time::Instant;
 use ringcat_engine::{Scan, ScanError};
 
-use super::alarm::Lookout;
+use super::alarm::ActiveMonitor;
 use super::policy::Dice;
 use super::{ForwardingCounters, NeedsTwoLinks, Policy};
 use crate::acyclic::Inline;
@@ -43,7 +43,7 @@ pub struct Joining {
     silent_since: Instant,
     /// Silence after which this one becomes ACTIVE.
     limit: Duration,
-    lookout: Lookout,
+    monitor: ActiveMonitor,
 }
 
 impl Joining {
@@ -55,8 +55,8 @@ impl Joining {
     pub(crate) fn on(links: &impl Links, policy: &Policy) -> Joining {
         let (main, now) = (links.addresses().main, links.now());
         let pause = Dice::new(main, now).up_to(policy.listen);
-        let (limit, lookout) = (policy.listen + pause, Lookout::new(now));
-        Joining { takes_over: policy.takes_over, silent_since: now, limit, lookout }
+        let (limit, monitor) = (policy.listen + pause, ActiveMonitor::new(now));
+        Joining { takes_over: policy.takes_over, silent_since: now, limit, monitor }
     }
 
     /// What follows from the frames that were received. Without a link that is up none can be received: then it listens
@@ -73,7 +73,7 @@ impl Joining {
 
     /// Whether an alarm is to be reported. A MainDevice that may become ACTIVE gets time to do so first.
     pub(crate) fn look_out(&mut self, partner: &PartnerStatus, now: Instant) -> Option<CyclicStandbyEvent> {
-        self.lookout.note(partner.at, self.limit.saturating_mul(if self.takes_over { 2 } else { 1 }), now)
+        self.monitor.note(partner.at, self.limit.saturating_mul(if self.takes_over { 2 } else { 1 }), now)
     }
 
     pub(crate) fn decide(&mut self, partner: &PartnerStatus, has_link: bool, now: Instant) -> Next {

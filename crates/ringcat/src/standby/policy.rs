@@ -12,7 +12,7 @@ use ringcat_engine::role::RoleRequest;
 use ringcat_engine::time::Instant;
 use ringcat_wire::frame::MacAddress;
 
-use super::alarm::Lookout;
+use super::alarm::ActiveMonitor;
 
 /// Fewer cycles without process data may be those of a single fault of a cable.
 const LEAST_CYCLES: u32 = 3;
@@ -149,26 +149,26 @@ pub(crate) struct Watch {
     dice: Dice,
     /// The random pause, and since when this MainDevice is INACTIVE for which it was chosen.
     pause: (Instant, Duration),
-    lookout: Lookout,
+    monitor: ActiveMonitor,
 }
 
 impl Watch {
     /// For cycles of this period, of a MainDevice with this main address.
     pub fn new(policy: Policy, period: Duration, main: MacAddress, now: Instant) -> Watch {
         let (time_out, dice) = (policy.time_out_of(period), Dice::new(main, now));
-        let (pause, lookout) = ((Instant::NEVER, Duration::ZERO), Lookout::new(now));
-        Watch { policy, time_out, own: main, dice, pause, lookout }
+        let (pause, monitor) = ((Instant::NEVER, Duration::ZERO), ActiveMonitor::new(now));
+        Watch { policy, time_out, own: main, dice, pause, monitor }
     }
 
     /// Whether an alarm is to be reported in the cycle that begins now. A MainDevice that takes over gets time to do so
     /// first.
     pub fn look_out(&mut self, situation: &Situation, now: Instant) -> Option<CyclicStandbyEvent> {
         if situation.role == MainDeviceRole::Active {
-            self.lookout.is_active(now);
+            self.monitor.is_active(now);
             return None;
         }
         let limit = self.time_out.saturating_mul(if self.policy.takes_over { 3 } else { 1 });
-        self.lookout.note(situation.partner_data_at.or(situation.partner_frame_at), limit, now)
+        self.monitor.note(situation.partner_data_at.or(situation.partner_frame_at), limit, now)
     }
 
     /// What is requested in the cycle that begins now.

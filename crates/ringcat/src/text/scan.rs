@@ -22,8 +22,8 @@ pub(super) fn describe(event: &Event, names: &Names, ends: [Option<Occupant>; 2]
         }
         Event::ScanFinished { subdevices } => format!("scan finished: {subdevices} SubDevices"),
         Event::ScanFailed { reason } => format!("scan failed: {reason}"),
-        Event::SiiOddity { position, what } => format!("{}: SII: {what}", at(*position)),
-        Event::CablingOddity { position, what } => format!("{}: {what}", at(*position)),
+        Event::SiiWarning { position, what } => format!("{}: SII: {what}", at(*position)),
+        Event::CablingWarning { position, what } => format!("{}: {what}", at(*position)),
         Event::UnconnectedPort0 { position } => format!("{}: port 0 is not connected", at(*position)),
         Event::LineCrossed { position: Some(position), entry_port: Some(port) } => {
             format!("{}: line crossed, frames enter at port {port}", at(*position))

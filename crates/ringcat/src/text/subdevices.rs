@@ -34,7 +34,7 @@ pub(super) fn describe(event: &Event, names: &Names, ends: [Option<Occupant>; 2]
         Event::ConfigurationFailed { subdevice, reason } => {
             format!("{}: configuration failed: {reason}", names.of(*subdevice))
         }
-        Event::PlanOddity { subdevice, what } => format!("{}: {what}", names.of(*subdevice)),
+        Event::DeclarationWarning { subdevice, what } => format!("{}: {what}", names.of(*subdevice)),
         Event::Unexpected { position, identity } => format!(
             "{}: not declared: vendor {:#010x}, product {:#010x}",
             names.at(*position, ends[0]),

@@ -113,7 +113,7 @@ fn outputs_that_come_slower_than_their_watchdog_are_named() -> Result<(), Error>
     let mut application = main_device.activate(declaration)?;
     let events = run(&mut application, 1);
     let text = "its outputs come every 150 ms, its watchdog expires after 100 ms".to_owned();
-    assert!(events.contains(&Event::PlanOddity { subdevice: SubDeviceId(0), what: text }), "{events:?}");
+    assert!(events.contains(&Event::DeclarationWarning { subdevice: SubDeviceId(0), what: text }), "{events:?}");
     Ok(())
 }
 
@@ -164,7 +164,7 @@ fn an_absent_optional_subdevice_has_its_place_and_leaves_the_domain_complete() -
     let entry = application.entry(SubDeviceId(3), 0x6000, 3).expect("the declaration says where it lies");
     assert_eq!((entry.bit_length, entry.bit_offset % 8), (1, 2));
     let events = run(&mut application, 100);
-    let without_place = |event: &Event| matches!(event, Event::PlanOddity { subdevice: SubDeviceId(4), .. });
+    let without_place = |event: &Event| matches!(event, Event::DeclarationWarning { subdevice: SubDeviceId(4), .. });
     assert!(events.iter().any(without_place), "{events:?}");
     assert!(application.all_settled());
     assert_eq!(application.exchange_mut().status(DomainId(0)).expect("it is declared").state, DomainState::Complete);

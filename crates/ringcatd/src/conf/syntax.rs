@@ -191,7 +191,7 @@ impl Reader<'_> {
         }
     }
 
-    /// `\` and what follows; inside of quotes it stays in front of all but these.
+    /// `\` and what follows; inside of quotes it is kept unless one of these follows.
     fn escaped(&mut self, name: &str, special: Option<&[u8]>, value: &mut Vec<u8>) -> Result<(), String> {
         self.next();
         match self.next() {

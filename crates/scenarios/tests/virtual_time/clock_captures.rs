@@ -362,7 +362,13 @@ fn modified_delays_are_found_crossed_behind_forks_and_in_rings() {
     let tampering = Tampering::with(fork(), |_| ());
     // The second clock of a branch against its first; a branch as a whole against the clocks before and behind it.
     tampering.add_longer(&mut cases, "ns is what was measured", &[0x1004], 0x0920, 4);
-    tampering.add_longer(&mut cases, "before what is in front of it has ended", &[0x1005, 0x1006], 0x0920, -2_100);
+    tampering.add_longer(
+        &mut cases,
+        "before the branch processed earlier has ended",
+        &[0x1005, 0x1006],
+        0x0920,
+        -2_100,
+    );
     tampering.add_longer(&mut cases, "after the frame was back", &[0x1007], 0x0920, 2_000);
     // In a ring that was broken from the start and is closed later.
     let mut network = wired(clocked(7, 100), &RING_BEHIND_JUNCTION);

@@ -77,7 +77,7 @@ fn delays_behind_splitters_without_a_clock_are_those_of_the_cables() {
     assert!(error.abs() <= 20, "{error} ns from {second} ns");
 }
 
-/// The time between branches of a splitter without a clock in front of it cannot be measured.
+/// The time between branches of a splitter without a clock upstream of it cannot be measured.
 // covers: dc-delays
 #[test]
 fn an_unknown_delay_behind_a_splitter_at_the_head_is_reported() {

@@ -52,7 +52,7 @@ fn a_reference_that_was_power_cycled_is_back_in_op_within_5_s_at_any_host_jitter
         let [apart, apart_others] = watch(&mut world, [&clocks, &others], 3_000);
         let reports = window_events(&world, mark);
         println!("{text}: back after {} ms, {apart} ns apart, {reports} times reported", back.as_millis());
-        // Clocks behind the reference are exact; the clock in front of it receives the host's prediction.
+        // Clocks behind the reference are exact; the clock upstream of it receives the host's prediction.
         assert!(apart <= 1_000 && reports <= 6, "{text}: {apart} ns apart, {reports} times reported");
         assert!(closed || apart_others <= 100, "{text}: {apart_others} ns");
     }
@@ -84,7 +84,7 @@ fn sync0_stays_synchronous_through_cuts_with_a_host_50_us_late() {
     }
 }
 
-/// The sender is on average 200 us late: clocks in front of the reference follow the estimate of the host, and do not
+/// The sender is on average 200 us late: clocks upstream of the reference follow the estimate of the host, and do not
 /// lock. Without SYNC signals no SubDevice waits for them, and the other clocks are as exact as before; with SYNC
 /// signals these SubDevices wait in SAFEOP.
 // covers: 7.2, 7.3, dc-late-host
@@ -132,7 +132,7 @@ fn a_clock_without_sync_in_front_of_the_reference_delays_no_subdevice() {
     }
 }
 
-/// SubDevices with SYNC signals in front of the reference follow its predicted time: the prediction has the rate of the
+/// SubDevices with SYNC signals upstream of the reference follow its predicted time: the prediction has the rate of the
 /// reference, so that they lock and are as exact as those behind, whatever the cycle.
 // covers: 7.2, 7.3, dc-reference
 #[test]

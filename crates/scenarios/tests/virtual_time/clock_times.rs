@@ -277,7 +277,7 @@ fn another_reference_is_chosen_while_pulses_run() {
             }
             let text = format!("{kind} of {count}, reference {chosen}: {apart} ns apart, then {settled} ns");
             println!("{text}");
-            // Clocks in front of the reference follow the time that the host predicts.
+            // Clocks upstream of the reference follow the time that the host predicts.
             assert!(apart <= 1_000 && settled <= if chosen == 0 { 200 } else { 1_000 }, "{text}");
             let is = |event: &Event| match event {
                 Event::ReferenceClock { position } => position.is_some_and(|at| usize::from(at.0) == chosen),

@@ -134,7 +134,7 @@ fn a_reference_without_a_clock_is_named_and_another_one_reported() {
     let events: Vec<Event> = std::iter::from_fn(|| application.pop_event()).map(|timed| timed.event).collect();
     let what = "declared as the reference clock, but it has no distributed clock: the clock at position 0 is the \
                 reference";
-    let expected = Event::PlanOddity { subdevice: SubDeviceId(1), what: what.to_owned() };
+    let expected = Event::DeclarationWarning { subdevice: SubDeviceId(1), what: what.to_owned() };
     assert_eq!(events.iter().filter(|event| **event == expected).count(), 1, "{events:#?}");
     let reference: Vec<bool> = application.clocks().iter().map(|clock| clock.is_reference).collect();
     assert_eq!(reference, [true, false], "the coupler has the first clock");
@@ -211,7 +211,7 @@ fn a_declared_ring_that_is_a_line_is_a_difference_that_prevents_op() {
     assert_eq!(network.configuration.differences(closed, &network.stated()), []);
 }
 
-/// A ring behind a junction that the bus has, and three that it does not have: another tail, a tail in front of the
+/// A ring behind a junction that the bus has, and three that it does not have: another tail, a tail upstream of the
 /// head, a port that does not exist.
 // covers: network-file, junctions, JR-06
 #[test]

@@ -30,7 +30,7 @@ const CLOCK_SET_UP_REGISTERS: std::ops::Range<u16> = 0x0920..0x0936;
 /// Two with a mailbox, two with device emulation, two with neither.
 const MIXED: [&str; 6] =
     ["servo", "digital-output-8", "emulated-output-8", "servo", "emulated-input-8", "digital-input-8"];
-/// SII_CONTROL to SII_DATA: with SII_CONFIGURATION in front of them the EEPROM only changes its owner.
+/// SII_CONTROL to SII_DATA: with SII_CONFIGURATION before them the EEPROM only changes its owner.
 const SII_INTERFACE: std::ops::Range<u16> = 0x0502..0x0510;
 const PREOP: AlStatus = AlStatus::new(AlState::PreOp);
 
@@ -134,7 +134,7 @@ fn another_declaration_is_active_at_once_after_deactivation() {
             main_device = application.deactivate(LastOutputs::Held, LIMIT).expect("all follow");
             assert_eq!(statuses(&mut main_device), [PREOP; MIXED.len()], "{declared:?}");
             while let Some(event) = main_device.pop_event() {
-                assert!(!matches!(event.event, Event::SiiOddity { .. } | Event::ScanFailed { .. }), "{event:?}");
+                assert!(!matches!(event.event, Event::SiiWarning { .. } | Event::ScanFailed { .. }), "{event:?}");
             }
         }
     }

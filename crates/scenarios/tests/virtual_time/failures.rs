@@ -191,7 +191,7 @@ fn a_wrong_sii_checksum_is_reported_and_does_not_affect_others() {
     world.run_cycles(200);
     let start = world.beginning();
     let reports = |event: &Event| {
-        matches!(event, Event::SiiOddity { position, what }
+        matches!(event, Event::SiiWarning { position, what }
         if position.0 == 2 && what.contains("checksum: expected"))
     };
     assert!(world.saw(start, reports));

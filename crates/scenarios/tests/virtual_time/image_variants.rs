@@ -134,7 +134,7 @@ fn evaluate(made: &Variant, odd: DeviceDescription) -> Result<(Outcome, bool), S
     if outcome == Outcome::Complete && !all_complete(&world) {
         return Err("complete only for a while".to_owned());
     }
-    let oddity = |event: &Event| matches!(event, Event::SiiOddity { position, .. } if usize::from(position.0) == ODD);
+    let oddity = |event: &Event| matches!(event, Event::SiiWarning { position, .. } if usize::from(position.0) == ODD);
     let warned = world.saw(world.beginning(), oddity);
     if let Change::Cut { is_inside: true, .. } = made.change
         && !warned
@@ -142,7 +142,7 @@ fn evaluate(made: &Variant, odd: DeviceDescription) -> Result<(Outcome, bool), S
         return Err("cut short, and no warning".to_owned());
     }
     let at_byte_0 = |event: &Event| {
-        matches!(event, Event::SiiOddity { position, what } if usize::from(position.0) == ODD
+        matches!(event, Event::SiiWarning { position, what } if usize::from(position.0) == ODD
             && what.contains("byte 0:"))
     };
     if world.saw(world.beginning(), at_byte_0) {

@@ -311,7 +311,7 @@ fn outputs_of_sm_synchronous_subdevices_are_taken_once_in_a_cycle() {
         world.run_cycles(3);
         assert_eq!(world.application().cyclic_counters().sent_again - tries, 1, "cable {cable}");
         let taken: Vec<u64> = latched(&world).iter().zip(before).map(|(now, before)| now - before).collect();
-        // Devices in front of the loss have processed the first try.
+        // Devices upstream of the loss have processed the first try.
         let times = |device: usize| if device < cable { 4 } else { 3 };
         assert_eq!((taken[0], taken[3], taken[4]), (times(0), times(3), times(4)), "cable {cable}");
         assert_eq!(taken[1], if 1 < cable { 3 } else { 2 }, "cable {cable}: once in each cycle at most");

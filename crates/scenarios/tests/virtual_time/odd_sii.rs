@@ -47,7 +47,7 @@ fn odd(world: &World) -> &SubDeviceInfo {
 
 fn reports(world: &World, text: &str) -> bool {
     world.saw(world.beginning(), |event| {
-        matches!(event, Event::SiiOddity { position, what } if usize::from(position.0) == ODD && what.contains(text))
+        matches!(event, Event::SiiWarning { position, what } if usize::from(position.0) == ODD && what.contains(text))
     })
 }
 
@@ -92,7 +92,7 @@ fn the_dictionary_has_priority_over_the_sii_which_is_reported() {
     trusting.run_cycles(100);
     // The SubDevice refuses, and the reason is found.
     let explained = |event: &Event| {
-        matches!(event, Event::PlanOddity { subdevice: SubDeviceId(ODD), what }
+        matches!(event, Event::DeclarationWarning { subdevice: SubDeviceId(ODD), what }
             if what == "SM 2: 2 bytes are configured, the PDOs in the dictionary have 4")
     };
     assert!(trusting.saw(trusting.beginning(), explained), "{:?}", troubles(trusting.events(trusting.beginning())));
@@ -312,7 +312,7 @@ fn an_sii_repaired_in_operation_is_reported_without_a_place() {
     world.until(Duration::from_secs(5), "it is in SAFEOP", is_safe);
     world.until(Duration::from_secs(5), "all settled", |world| world.application().all_settled());
     let says = |event: &Event| {
-        matches!(event, Event::PlanOddity { subdevice: SubDeviceId(ODD), what }
+        matches!(event, Event::DeclarationWarning { subdevice: SubDeviceId(ODD), what }
             if what.contains("it has no place in the process image before the next activation, and stays in SAFEOP"))
     };
     let reports = world.events(mark).iter().filter(|timed| says(&timed.event));

@@ -14,7 +14,7 @@ use scenarios::delays::idle::{Reported, report};
 use scenarios::segments::{MAIN, REDUNDANT, RING_BEHIND_JUNCTION, RING_OF_THREE, at};
 use scenarios::tap::Tap;
 
-/// The cable to the redundant link, and the one in front of it, in [`both_rings`].
+/// The cable to the redundant link, and the one upstream of it, in [`both_rings`].
 const REDUNDANT_CABLE: CableId = CableId(8);
 const IN_FRONT: CableId = CableId(7);
 const COUNT: usize = 7;

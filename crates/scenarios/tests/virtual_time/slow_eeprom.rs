@@ -53,7 +53,7 @@ fn an_eeprom_that_is_always_slow_is_given_up_after_30_s_with_its_word() {
         MainDevice::request(Tap::new(network(vec![terminal(Duration::from_micros(500)), slow])), &Options::default());
     let mut reports = Vec::new();
     let result = main_device.scan_with(|timed| {
-        if let Event::SiiOddity { position, what } = &timed.event {
+        if let Event::SiiWarning { position, what } = &timed.event {
             reports.push((position.0, what.clone()));
         }
     });

@@ -142,7 +142,7 @@ fn seeds_from_the_environment() {
     }
 }
 
-/// Devices of one type behind a coupler and in front of an input; which of them are declared.
+/// Devices of one type behind a coupler and upstream of an input; which of them are declared.
 fn behind_a_coupler(is_ring: bool, declared: [bool; 3], with_idle: bool) -> Twins {
     let kinds = ["coupler", "digital-output-8", "digital-output-8", "digital-output-8", "digital-input-8"];
     let declared = vec![true, declared[0], declared[1], declared[2], true];

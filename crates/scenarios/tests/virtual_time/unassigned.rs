@@ -250,7 +250,7 @@ fn an_optional_subdevice_does_not_take_the_place_of_an_identical_one() {
 }
 
 /// Power of a declared SubDevice fails beside undeclared ones of its type. A ring reaches those behind it from the
-/// other side, a line those in front of it. Judged inside the undeclared ones in each cycle.
+/// other side, a line those upstream of it. Judged inside the undeclared ones in each cycle.
 // covers: identity
 #[test]
 fn an_undeclared_twin_does_not_take_the_place_of_a_lost_subdevice() {

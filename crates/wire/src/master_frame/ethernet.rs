@@ -1,4 +1,4 @@
-//! Ethernet frames between both MainDevices, in acyclic master frames: the head in front of each one (protocol 9.12).
+//! Ethernet frames between both MainDevices, in acyclic master frames: the head before each one (protocol 9.12).
 //!
 //! An acyclic master frame has two fragments: [`Area::EthernetToInactive`], which the ACTIVE writes, and
 //! [`Area::EthernetToActive`], whose room the INACTIVE fills. Both begin with this head; the number of the frame is in

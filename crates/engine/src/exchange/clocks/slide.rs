@@ -11,7 +11,7 @@ use crate::time::Instant;
 /// Nanoseconds in which the control loop moves the system time by one: 200 ppm. Loops take out 760 ppm, of which up to
 /// 200 compensate the drift of the clocks.
 const SLOWNESS: u64 = 5_000;
-/// Readings of the two halves differ by up to this: other frames are on the wire in front of theirs.
+/// Readings of the two halves differ by up to this: other frames are on the wire before theirs.
 const SAME_NS: u64 = 50_000;
 /// Longest time between two steps that counts.
 const LONGEST_NS: u64 = 100_000_000;

@@ -70,7 +70,7 @@ impl<S: Server> Device<S> {
         self.queue.push_back((now, mail));
     }
 
-    /// Queues unsolicited mail in front of all waiting mail.
+    /// Queues unsolicited mail before all waiting mail.
     pub fn queue_first(&mut self, protocol: Protocol, payload: &[u8], now: Instant) {
         self.queue_mail(protocol, payload, now);
         if let Some(mail) = self.queue.pop_back() {

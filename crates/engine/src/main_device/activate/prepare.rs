@@ -26,7 +26,7 @@ use crate::plan::{PlanError, PlanFault, PlanProblem, SubDevicePlan, plan};
 use crate::procedures::request_state::exchanges;
 use crate::procedures::scan::station_at;
 use crate::procedures::shared_segment::SharedSegment;
-use crate::segment::findings::{DeclarationFinding, Oddity};
+use crate::segment::findings::{DeclarationFinding, SettingFinding};
 use crate::segment::member::MemberView;
 use crate::segment::setup::{Setup, SetupError, declared_areas, planned_areas, presence};
 use crate::segment::{Found, Observation, Owners, SubDevice, SubDevices};
@@ -322,19 +322,19 @@ pub(in crate::main_device) fn with_domain(mut declaration: Declaration) -> Decla
 
 /// Reports rules that SubDevices cannot follow, and optional SubDevices for which the process image has no place.
 pub(in crate::main_device) fn report_oddities(segment: &SharedSegment, subdevices: &SubDevices, layout: &Layout) {
-    let report = |subdevice: usize, oddity: Oddity| {
-        segment.observe(Observation::Compared(DeclarationFinding::Oddity(SubDeviceId(subdevice), oddity)));
+    let report = |subdevice: usize, warning: SettingFinding| {
+        segment.observe(Observation::Compared(DeclarationFinding::SettingFinding(SubDeviceId(subdevice), warning)));
     };
     for (subdevice, member) in subdevices.members().enumerate() {
         let warnings = member.setup.iter().flat_map(|setup| &setup.plan.warnings);
         for warning in warnings {
-            report(subdevice, Oddity::Plan(*warning));
+            report(subdevice, SettingFinding::Plan(*warning));
         }
         if let Some((period, watchdog)) = beyond_watchdog(subdevice, &member, layout) {
-            report(subdevice, Oddity::Watchdog { period, watchdog });
+            report(subdevice, SettingFinding::Watchdog { period, watchdog });
         }
         if member.info.is_none() && declared_areas(&member.config).is_none() {
-            report(subdevice, Oddity::NoPlace);
+            report(subdevice, SettingFinding::NoPlace);
         }
     }
 }

@@ -6,10 +6,10 @@ use core::fmt;
 /// Memory for the image of a domain. Copies of a declaration share it; one of them can be activated, after the others
 /// are dropped.
 #[derive(Clone)]
-pub struct ImageMemory(Arc<Given>);
+pub struct ImageMemory(Arc<Memory>);
 
 /// The application's memory.
-struct Given(&'static mut [u8]);
+struct Memory(&'static mut [u8]);
 
 impl fmt::Debug for ImageMemory {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -20,7 +20,7 @@ impl fmt::Debug for ImageMemory {
 impl ImageMemory {
     /// Memory that is at least as long as the image.
     pub fn new(memory: &'static mut [u8]) -> ImageMemory {
-        ImageMemory(Arc::new(Given(memory)))
+        ImageMemory(Arc::new(Memory(memory)))
     }
 
     /// Whether no copy of the declaration has the memory, too.

@@ -13,7 +13,7 @@ use crate::main_device::activate::activate_error::ActivateError;
 use crate::main_device::declaration::Declaration;
 use crate::procedures::scan::{Scan, cabling_findings, node_status};
 use crate::procedures::shared_segment::SharedSegment;
-use crate::segment::findings::{DeclarationFinding, Oddity};
+use crate::segment::findings::{DeclarationFinding, SettingFinding};
 use crate::segment::{Found, Observation, SubDevices};
 use crate::supervisor::Bus;
 use crate::topology::{Closing, NodeStatus, PortOf, Topology};
@@ -43,8 +43,8 @@ impl Loaded {
             match closing(connection, found).map_err(ActivateError::Junction)? {
                 Ok(closing) => closings.push(closing),
                 Err(subdevice) => {
-                    let oddity = Oddity::AbsentEnd(*connection);
-                    segment.observe(Observation::Compared(DeclarationFinding::Oddity(subdevice, oddity)));
+                    let warning = SettingFinding::AbsentEnd(*connection);
+                    segment.observe(Observation::Compared(DeclarationFinding::SettingFinding(subdevice, warning)));
                 }
             }
         }

@@ -20,7 +20,7 @@ use crate::mail::InUse;
 use crate::main_device::MainDevice;
 use crate::main_device::standby::Collision;
 use crate::procedures::error_statistics::ErrorStatistics;
-use crate::procedures::shared_segment::Beside;
+use crate::procedures::shared_segment::SegmentData;
 use crate::role::{MainDeviceRole, Partner, RoleCause, RoleRequest};
 use crate::segment::clocks::ClockObservation;
 use crate::segment::member::{MemberView, Phase};
@@ -190,8 +190,8 @@ impl MainDevice {
         let mailboxes = (0..count).map(|index| self.new_mailbox(SubDeviceId(index))).collect();
         let statistics = ErrorStatistics::new(&bus, count, self.statistics_period);
         self.statistics = Some(statistics.clone());
-        let beside = Beside { mailboxes, cache: self.cache.clone(), statistics };
-        self.segment = self.segment.without_application(&bus).with_application(&bus, board.clone(), beside);
+        let data = SegmentData { mailboxes, cache: self.cache.clone(), statistics };
+        self.segment = self.segment.without_application(&bus).with_application(&bus, board.clone(), data);
         self.supervisor.attach(board);
         self.supervisor.attach_bell(self.requests.bell().clone());
     }

@@ -39,7 +39,7 @@ impl BringUp<'_> {
                     area.length,
                     bits.div_ceil(8)
                 );
-                self.segment.observe_member((self.index, self.attempt), MemberFinding::Oddity(what));
+                self.segment.observe_member((self.index, self.attempt), MemberFinding::SettingFinding(what));
             }
         }
     }

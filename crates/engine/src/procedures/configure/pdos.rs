@@ -72,7 +72,7 @@ impl BringUp<'_> {
             return Err(error);
         }
         let what = format!("SM {sync_manager}: its PDOs are not as declared: {error}");
-        self.segment.observe_member((self.index, self.attempt), MemberFinding::Oddity(what));
+        self.segment.observe_member((self.index, self.attempt), MemberFinding::SettingFinding(what));
         Ok(())
     }
 

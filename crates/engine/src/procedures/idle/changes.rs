@@ -21,7 +21,7 @@ use crate::procedures::scan::{
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::unassigned::{give, level, view};
 use crate::segment::view::View;
-use crate::segment::{Found, Given, IdleObservation};
+use crate::segment::{Found, IdleObservation, TemporaryAddress};
 use crate::supervisor::{Bus, BusError};
 use crate::topology::Topology;
 
@@ -87,8 +87,8 @@ async fn give_all(
     segment: &SharedSegment,
     mut now: View,
     mut old: Vec<StationAddress>,
-) -> Result<Option<(Vec<Given>, View)>, BusError> {
-    let mut given: Vec<Given> = Vec::new();
+) -> Result<Option<(Vec<TemporaryAddress>, View)>, BusError> {
+    let mut given: Vec<TemporaryAddress> = Vec::new();
     while !old.is_empty() {
         let (more, is_complete) = give(bus, segment, &now, &old).await?;
         let is_stuck = more.is_empty() || given.len() > usize::from(MAX_SUBDEVICES);
@@ -160,7 +160,7 @@ fn lost(view: &View, known: &[Rc<SubDeviceInfo>]) -> Vec<StationAddress> {
 async fn read_new(
     bus: &Bus,
     options: &ScanOptions,
-    fresh: Vec<(Position, Given)>,
+    fresh: Vec<(Position, TemporaryAddress)>,
 ) -> Result<Vec<SubDeviceInfo>, ScanError> {
     if fresh.is_empty() {
         return Ok(Vec::new());

@@ -29,7 +29,7 @@ const POLL_LEN: usize = 14;
 
 /// A read command sent to the controller.
 #[derive(Clone, Copy, Debug)]
-struct Given {
+struct SentCommand {
     word: u32,
     /// When its frame left.
     at: Instant,
@@ -60,7 +60,7 @@ pub(super) struct Eeprom {
     station: StationAddress,
     pub(super) pace: Pace,
     eight_bytes: bool,
-    given: Option<Given>,
+    given: Option<SentCommand>,
     until: Instant,
     words: Vec<Option<u16>>,
 }
@@ -204,14 +204,14 @@ impl Eeprom {
 
     async fn command(&mut self, word: u32) -> Result<(), BusError> {
         let sent_at = self.write(Eeprom::read_command(word)).await?;
-        self.given = Some(Given { word, at: sent_at.unwrap_or_else(|| self.bus.now()) });
+        self.given = Some(SentCommand { word, at: sent_at.unwrap_or_else(|| self.bus.now()) });
         Ok(())
     }
 
     /// Polls until a command has ended, and sends the next one at once. Times count from departure to departure: a
     /// command and its poll take the same path, so the propagation time of a long frame through many SubDevices does
     /// not count.
-    async fn finish(&mut self, given: Given, next: Option<u32>) -> Result<Result<(), Failure>, SiiReadError> {
+    async fn finish(&mut self, given: SentCommand, next: Option<u32>) -> Result<Result<(), Failure>, SiiReadError> {
         self.bus.sleep_until(given.at + self.pace.first()).await;
         let mut early = None;
         let mut busy: Option<(u32, Instant)> = None;
@@ -219,7 +219,7 @@ impl Eeprom {
             let poll = self.poll(next).await?;
             let elapsed = poll.at.since(given.at);
             if let (Some(at), Some(word)) = (poll.taken, next) {
-                self.given = Some(Given { word, at });
+                self.given = Some(SentCommand { word, at });
             }
             if !poll.control.busy {
                 self.pace.took(elapsed, early);

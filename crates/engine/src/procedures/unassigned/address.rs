@@ -16,7 +16,7 @@ use ringcat_wire::register::map;
 use super::super::scan::MAX_SUBDEVICES;
 use super::super::shared_segment::SharedSegment;
 use crate::segment::view::View;
-use crate::segment::{Given, Observation};
+use crate::segment::{Observation, TemporaryAddress};
 use crate::supervisor::{Bus, BusError};
 
 /// Addresses assigned in one round, before all others are scanned again.
@@ -66,7 +66,7 @@ pub(in super::super) async fn give(
     segment: &SharedSegment,
     view: &View,
     old: &[StationAddress],
-) -> Result<(Vec<Given>, bool), BusError> {
+) -> Result<(Vec<TemporaryAddress>, bool), BusError> {
     let mut given = Vec::new();
     for station in old {
         let mut left = view.positions(*station).count();
@@ -80,7 +80,7 @@ pub(in super::super) async fn give(
                 return Ok((given, false));
             }
             let new = new.into_iter().zip(taken).filter(|(_, taken)| *taken);
-            given.extend(new.map(|(new, _)| Given { station: new, before: *station }));
+            given.extend(new.map(|(new, _)| TemporaryAddress { station: new, before: *station }));
             left = left.saturating_sub(taken.into_iter().filter(|taken| *taken).count());
         }
     }

@@ -18,9 +18,9 @@ use crate::supervisor::{Bus, BusError};
 
 /// Evidence whether a SubDevice is a member.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in super::super) enum Mark {
+pub(in super::super) enum MappingEvidence {
     /// It holds the FMMUs that were written to the member.
-    Borne,
+    Held,
     /// It does not hold the FMMUs that were written to the member.
     Missing,
     /// No process data is mapped for the member at present.
@@ -30,27 +30,27 @@ pub(in super::super) enum Mark {
 }
 
 /// Whether the SubDevice at a station address holds the mapping of a member.
-pub(in super::super) async fn mark(
+pub(in super::super) async fn mapping_evidence(
     bus: &Bus,
     segment: &SharedSegment,
     index: usize,
     station: StationAddress,
-) -> Result<Mark, BusError> {
+) -> Result<MappingEvidence, BusError> {
     let (expected, is_mapped) = {
         let access = segment.view();
-        let Some(member) = access.member(index) else { return Ok(Mark::None) };
+        let Some(member) = access.member(index) else { return Ok(MappingEvidence::None) };
         let registers = member.setup.as_ref().map(|setup| setup.fmmu_registers());
         (registers.unwrap_or_default(), member.configured)
     };
     match (expected.is_empty(), is_mapped) {
-        (true, _) => return Ok(Mark::None),
-        (false, false) => return Ok(Mark::Unmapped),
+        (true, _) => return Ok(MappingEvidence::None),
+        (false, false) => return Ok(MappingEvidence::Unmapped),
         (false, true) => {}
     }
     match bus.fprd(station, map::FMMU_BASE, expected.len()).await {
-        Ok(got) => Ok(if got == expected { Mark::Borne } else { Mark::Missing }),
+        Ok(got) => Ok(if got == expected { MappingEvidence::Held } else { MappingEvidence::Missing }),
         // It has fewer FMMUs than the member.
-        Err(BusError::Wkc { got: Wkc(0), .. }) => Ok(Mark::Missing),
+        Err(BusError::Wkc { got: Wkc(0), .. }) => Ok(MappingEvidence::Missing),
         Err(error) => Err(error),
     }
 }
@@ -123,17 +123,19 @@ async fn keeper(
         Some(then) if !has_moved => *then == station,
         _ => !known.contains(&after.stations[*at]),
     };
-    let mut bearers = Vec::new();
+    let mut holders = Vec::new();
     for at in (0..after.stations.len()).filter(is_candidate) {
         let now = after.stations[at];
-        match mark(bus, segment, index, now).await? {
-            Mark::Borne => bearers.push(now),
-            Mark::Missing => {}
-            Mark::Unmapped | Mark::None => return by_place(bus, segment, owners, before, after, index).await,
+        match mapping_evidence(bus, segment, index, now).await? {
+            MappingEvidence::Held => holders.push(now),
+            MappingEvidence::Missing => {}
+            MappingEvidence::Unmapped | MappingEvidence::None => {
+                return by_place(bus, segment, owners, before, after, index).await;
+            }
         }
     }
     // If several hold the mapping, one was configured in place of another before.
-    Ok(if let [only] = bearers[..] { Some(only) } else { None })
+    Ok(if let [only] = holders[..] { Some(only) } else { None })
 }
 
 /// The member by position and identity only.

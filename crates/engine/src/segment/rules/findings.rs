@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 use crate::config::ConfigError;
 use crate::event::Event;
 use crate::segment::effect::Effects;
-use crate::segment::findings::{CablingFindings, DeclarationFinding, Oddity, ScanFinding};
+use crate::segment::findings::{CablingFindings, DeclarationFinding, ScanFinding, SettingFinding};
 use crate::segment::model::Segment;
 use crate::topology::Finding;
 
@@ -21,7 +21,7 @@ impl Segment {
         for finding in findings {
             match finding {
                 ScanFinding::Sii { position, warning } => {
-                    effects.report(Event::SiiOddity { position, what: warning.to_string() });
+                    effects.report(Event::SiiWarning { position, what: warning.to_string() });
                 }
                 ScanFinding::DuplicateAlias(duplicate) => {
                     let (first, second) = (duplicate.first, duplicate.second);
@@ -49,7 +49,9 @@ pub(super) fn report_comparison(finding: DeclarationFinding, effects: &mut Effec
             }
         },
         DeclarationFinding::Cabling(cabling) => return report_cabling(&cabling, effects),
-        DeclarationFinding::Oddity(subdevice, oddity) => Event::PlanOddity { subdevice, what: text(&oddity) },
+        DeclarationFinding::SettingFinding(subdevice, warning) => {
+            Event::DeclarationWarning { subdevice, what: text(&warning) }
+        }
     });
 }
 
@@ -73,7 +75,7 @@ fn report_cabling(cabling: &CablingFindings, effects: &mut Effects) {
             | Finding::ClosedWithLink { .. }
             | Finding::LinkWithoutCommunication { .. }
             | Finding::Inconsistent { .. } => {
-                effects.report(Event::CablingOddity { position, what: finding.to_string() });
+                effects.report(Event::CablingWarning { position, what: finding.to_string() });
             }
         }
     }
@@ -82,24 +84,26 @@ fn report_cabling(cabling: &CablingFindings, effects: &mut Effects) {
     }
 }
 
-fn text(oddity: &Oddity) -> String {
-    match oddity {
-        Oddity::Plan(warning) => warning.to_string(),
-        Oddity::AbsentEnd(connection) => {
+fn text(warning: &SettingFinding) -> String {
+    match warning {
+        SettingFinding::Plan(warning) => warning.to_string(),
+        SettingFinding::AbsentEnd(connection) => {
             alloc::format!("not there: its {connection} is not watched until a rescan finds it")
         }
-        Oddity::Watchdog { period, watchdog } => {
+        SettingFinding::Watchdog { period, watchdog } => {
             let (period, watchdog) = (period.as_millis(), watchdog.as_millis());
             alloc::format!("its outputs come every {period} ms, its watchdog expires after {watchdog} ms")
         }
-        Oddity::NoPlace => "not there, and its PDOs are not declared: when it comes, it has no place in the process \
+        SettingFinding::NoPlace => {
+            "not there, and its PDOs are not declared: when it comes, it has no place in the process \
                             image"
-            .to_owned(),
-        Oddity::Reference { instead: Some(instead) } => alloc::format!(
+                .to_owned()
+        }
+        SettingFinding::Reference { instead: Some(instead) } => alloc::format!(
             "declared as the reference clock, but it has no distributed clock: the clock at position {instead} is the \
              reference"
         ),
-        Oddity::Reference { instead: None } => {
+        SettingFinding::Reference { instead: None } => {
             "declared as the reference clock, but neither it nor another SubDevice has a distributed clock".to_owned()
         }
     }

@@ -198,7 +198,7 @@ impl Segment {
         }
         let is_excused = !member.exchanges(member.target);
         if answered {
-            self.tell_apart(index);
+            self.exclude_from_place(index);
         }
         self.post_presence(index);
         self.board.set_taking_part(index, false);
@@ -250,7 +250,7 @@ impl Segment {
             MemberFinding::Reached(state) => self.settle(index, state, effects),
             MemberFinding::Returned => {
                 // It may be another SubDevice of the same type.
-                member.oddities = Default::default();
+                member.reported_warnings = Default::default();
                 member.mistaken = Mistaken::default();
                 member.answered = rounds;
                 self.post_presence(index);
@@ -281,9 +281,9 @@ impl Segment {
                     self.observe_pdos(station, finding, effects);
                 }
             }
-            MemberFinding::Oddity(what) => {
-                if member.oddities.is_new(&what) {
-                    effects.report(Event::PlanOddity { subdevice: SubDeviceId(index), what });
+            MemberFinding::SettingFinding(what) => {
+                if member.reported_warnings.is_new(&what) {
+                    effects.report(Event::DeclarationWarning { subdevice: SubDeviceId(index), what });
                 }
             }
         }
@@ -406,7 +406,7 @@ impl Segment {
         effects: &mut Effects,
     ) {
         if self.member(index).is_some_and(|member| member.is_mapped_as(mapping)) {
-            effects.report(Event::PlanOddity { subdevice: SubDeviceId(index), what });
+            effects.report(Event::DeclarationWarning { subdevice: SubDeviceId(index), what });
         }
     }
 
@@ -467,7 +467,7 @@ impl Member {
                 self.target = AlState::SafeOp;
                 what.push_str(", and stays in SAFEOP without outputs");
             }
-            effects.report(Event::PlanOddity { subdevice: SubDeviceId(index), what });
+            effects.report(Event::DeclarationWarning { subdevice: SubDeviceId(index), what });
         }
         self.setup = Some(Rc::new(setup));
     }

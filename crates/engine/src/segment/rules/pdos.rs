@@ -36,7 +36,7 @@ impl Segment {
             PdoFinding::Unreadable => return,
             PdoFinding::Held(held) => {
                 for warning in info.take_dictionary(held) {
-                    effects.report(Event::SiiOddity { position: info.position, what: warning.to_string() });
+                    effects.report(Event::SiiWarning { position: info.position, what: warning.to_string() });
                 }
             }
         }

@@ -82,7 +82,7 @@ impl Segment {
         match more {
             More::Sii(read) => {
                 for warning in info.extend(read) {
-                    effects.report(Event::SiiOddity { position: info.position, what: warning.to_string() });
+                    effects.report(Event::SiiWarning { position: info.position, what: warning.to_string() });
                 }
             }
             More::DataWords(words) => info.data_words = words,

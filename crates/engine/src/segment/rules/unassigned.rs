@@ -10,7 +10,6 @@ use crate::declared::SubDeviceId;
 use crate::event::Event;
 use crate::info::SubDeviceInfo;
 use crate::segment::effect::{Check, Effects, Task};
-use crate::segment::given::Given;
 use crate::segment::key::SubDeviceKey;
 use crate::segment::knowledge::Knowledge;
 use crate::segment::model::Segment;
@@ -19,6 +18,7 @@ use crate::segment::owners::Owners;
 use crate::segment::reading::Reading;
 use crate::segment::setup::Setup;
 use crate::segment::start::Start;
+use crate::segment::temporary_address::TemporaryAddress;
 use crate::segment::unassigned::{At, Unassigned};
 use crate::segment::versions::Versions;
 use crate::segment::view::View;
@@ -72,7 +72,7 @@ impl Segment {
         &mut self,
         versions: Versions,
         view: &View,
-        given: &[Given],
+        given: &[TemporaryAddress],
         now: Instant,
         effects: &mut Effects,
     ) {
@@ -162,9 +162,9 @@ impl Segment {
 
     /// A member that answered no longer does. SubDevices that were known to be undeclared then are others, and so are
     /// those that had answered at their own addresses when the member did.
-    pub(in crate::segment) fn tell_apart(&mut self, index: usize) {
+    pub(in crate::segment) fn exclude_from_place(&mut self, index: usize) {
         if let Some(answered) = self.member(index).map(|member| member.answered) {
-            self.subdevices.tell_apart(index, answered);
+            self.subdevices.exclude_from_place(index, answered);
         }
     }
 

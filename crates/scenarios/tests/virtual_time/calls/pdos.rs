@@ -302,7 +302,8 @@ fn other_pdos_of_a_subdevice_without_coe_are_a_warning() {
             said_by(&mut ecrt);
             ecrt.activate().expect("it is no error");
             let events = said_by(&mut ecrt);
-            let warns = |event: &Event| matches!(event, Event::PlanOddity { what, .. } if what.contains("without CoE"));
+            let warns =
+                |event: &Event| matches!(event, Event::DeclarationWarning { what, .. } if what.contains("without CoE"));
             assert_eq!(events.iter().any(warns), is_named, "{text}: {events:?}");
             ecrt.cycles(1_000);
             let status = ecrt.slave_config_state(config).expect("it is configured");
@@ -342,7 +343,8 @@ fn refused_pdos_are_a_warning_for_programs_and_the_subdevice_decides() {
         ecrt.activate().expect("it is no error");
         ecrt.cycles(1_500);
         let events = said_by(&mut ecrt);
-        let warns = |event: &Event| matches!(event, Event::PlanOddity { what, .. } if what.contains("not as declared"));
+        let warns =
+            |event: &Event| matches!(event, Event::DeclarationWarning { what, .. } if what.contains("not as declared"));
         assert!(events.iter().any(warns), "{events:?}");
         let status = ecrt.slave_config_state(config).expect("it is configured");
         assert_eq!(status.operational, accepts, "{pdo:#x}: {status:?}, {events:?}");

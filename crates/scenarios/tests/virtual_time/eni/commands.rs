@@ -14,7 +14,7 @@ use super::{DRIVE, EniFile, MACHINE, Plant, activate};
 /// User memory of a controller.
 pub(super) const USER: RegisterAddress = RegisterAddress(0x0F80);
 
-/// The machine with commands in front of those of the drive, of its dictionary, of its other protocols, of the bus.
+/// The machine with commands before those of the drive, of its dictionary, of its other protocols, of the bus.
 pub(super) fn with(registers: &str, objects: &str, protocols: &str, bus: &str) -> EniFile {
     let text = String::from_utf8(MACHINE.to_vec()).expect("it is text");
     let insert = |text: &str, from: usize, mark: &str, new: &str| {

@@ -138,7 +138,8 @@ fn an_eni_without_mailboxes_reaches_op_with_those_of_the_eeproms() {
     let mut plant = activate_on(network(BUS), eni, false).expect("the network is the one of the file");
     plant.settle();
     plant.compare(&mut Dice::new(7));
-    let named = |event: &&Event| matches!(event, Event::PlanOddity { what, .. } if what.contains("no mailboxes"));
+    let named =
+        |event: &&Event| matches!(event, Event::DeclarationWarning { what, .. } if what.contains("no mailboxes"));
     assert_eq!(plant.events.iter().filter(named).count(), 2, "{:?}", plant.events);
     // Without process data, too.
     for subdevice in &mut file.subdevice {
@@ -171,7 +172,7 @@ fn each_address_of_an_eni_that_differs_from_the_sii_is_reported_once() {
             application.cycle(|_| ());
             while let Some(event) = application.pop_event() {
                 match event.event {
-                    Event::PlanOddity { what, .. } if what.contains(wanted) => found.push(what),
+                    Event::DeclarationWarning { what, .. } if what.contains(wanted) => found.push(what),
                     _ => {}
                 }
             }

@@ -195,7 +195,7 @@ fn read(text: &str) -> EniFile {
     EniFile::from_bytes(text.as_bytes()).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Puts commands in front of those of the drive.
+/// Puts commands before those of the drive.
 fn with_commands_of_the_drive(commands: &str) -> EniFile {
     let text = String::from_utf8(MACHINE.to_vec()).expect("it is text");
     let drive = text.find("<Name>Drive</Name>").expect("it is there");

@@ -63,7 +63,7 @@ fn a_dictionary_with_a_part_of_the_pdos_replaces_nothing() {
         let mut main_device = idle_with(vec![device], &options());
         assert_eq!(bits(&main_device.subdevices()[0]), OF_SII, "{left_out:x?}");
         let is_it = |what: &str| what.contains("cannot be read");
-        let reports = |timed: &TimedEvent| matches!(&timed.event, Event::SiiOddity { what, .. } if is_it(what));
+        let reports = |timed: &TimedEvent| matches!(&timed.event, Event::SiiWarning { what, .. } if is_it(what));
         assert_eq!(events(&mut main_device).iter().any(reports), is_reported, "{left_out:x?}");
         main_device.attend(Duration::from_secs(3));
         assert!(events(&mut main_device).is_empty(), "it is said once");

@@ -133,7 +133,7 @@ fn only_right_connections_of_random_segments_are_accepted() {
     assert!(taken > 8 && wrong > 5, "{taken}, {wrong}");
 }
 
-/// A SubDevice in front of the ring comes back with another address: addresses no longer follow the positions.
+/// A SubDevice upstream of the ring comes back with another address: addresses no longer follow the positions.
 // covers: JR-05, JR-06, junctions
 #[test]
 fn connections_are_checked_at_the_addresses_that_subdevices_have() {

@@ -18,7 +18,7 @@ use crate::output::{say, warn};
 /// Their options.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Mailboxes")]
-pub struct BesideArguments {
+pub struct ServiceArguments {
     /// Make a network interface for each SubDevice with Ethernet over EtherCAT
     ///
     /// Their names are eoeXsY with this MainDevice's number X and the position Y, or eoeXaY with the alias Y. Needs
@@ -49,14 +49,18 @@ fn address(text: &str) -> Result<SocketAddr, String> {
     address.ok_or_else(|| format!("expected an address such as 127.0.0.1 or 192.168.1.5:34980, got {text:?}"))
 }
 
-impl BesideArguments {
+impl ServiceArguments {
     /// Starts the services of the options.
-    pub fn start(&self, supervisor: &SupervisorThread, interfaces: &InterfaceArguments) -> Result<Beside, Failure> {
-        let mut beside = Beside { ethernet: None, gateway: None };
+    pub fn start(
+        &self,
+        supervisor: &SupervisorThread,
+        interfaces: &InterfaceArguments,
+    ) -> Result<RunServices, Failure> {
+        let mut services = RunServices { ethernet: None, gateway: None };
         if self.eoe {
             let main = interface::list().into_iter().find(|found| found.name == interfaces.links.main);
             let main = main.map(|found| found.mac).unwrap_or_default();
-            beside.ethernet = Some(supervisor.start_ethernet(EthernetOptions::new(self.index, main))?);
+            services.ethernet = Some(supervisor.start_ethernet(EthernetOptions::new(self.index, main))?);
         }
         if let Some(address) = self.gateway {
             let gateway = supervisor.start_gateway(GatewayOptions::at(address))?;
@@ -66,20 +70,20 @@ impl BesideArguments {
                     "the mailbox gateway has no password: every program that reaches {address} may change SubDevices"
                 ));
             }
-            beside.gateway = Some(gateway);
+            services.gateway = Some(gateway);
         }
-        Ok(beside)
+        Ok(services)
     }
 }
 
 /// The services that run; they end when this is dropped.
 #[derive(Debug)]
-pub struct Beside {
+pub struct RunServices {
     ethernet: Option<Ethernet>,
     gateway: Option<Gateway>,
 }
 
-impl Beside {
+impl RunServices {
     /// What has happened since the last call.
     pub fn lines(&self) -> Vec<String> {
         let events = self.ethernet.iter().flat_map(Ethernet::take_events);
