@@ -37,6 +37,7 @@
 
 pub mod arrows;
 pub mod bars;
+pub mod before_and_after;
 pub mod circles;
 pub mod coverage;
 pub mod covers;
