@@ -93,7 +93,7 @@ fn said(output: &Output, succeeds: bool) -> String {
     said
 }
 
-const OF_A_DISTRIBUTION: [&str; 21] = [
+const OF_A_DISTRIBUTION: [&str; 25] = [
     "/etc/ethercat.conf",
     "/etc/security/limits.d/ethercat.conf",
     "/usr/bin/ethercat",
@@ -111,8 +111,12 @@ const OF_A_DISTRIBUTION: [&str; 21] = [
     "/usr/share/doc/ringcat/LICENSE-MIT",
     "/usr/share/doc/ringcat/ringcat-standby.conf",
     "/usr/share/fish/vendor_completions.d/ethercat.fish",
+    "/usr/share/man/man1/ringcat.1",
     "/usr/share/man/man8/ethercat-slaves.8",
     "/usr/share/man/man8/ethercat.8",
+    "/usr/share/man/man8/ethercatctl.8",
+    "/usr/share/man/man8/ringcatd.8",
+    "/usr/share/ringcat/demo.toml",
     "/usr/share/ringcat/installed",
     "/usr/share/zsh/vendor-completions/_ethercat",
 ];
@@ -124,9 +128,9 @@ fn all_files_come_to_the_places_of_a_distribution_and_nothing_is_left_of_them() 
     let about = root.install(&["--prefix", "/usr"]);
     let expected: BTreeSet<String> = OF_A_DISTRIBUTION.iter().map(ToString::to_string).collect();
     assert_eq!(root.files(), expected);
-    assert!(about.contains("20 files") && !about.contains("next:"), "{about}");
+    assert!(about.contains("24 files") && !about.contains("next:"), "{about}");
     // The list of the files is the only one that is not counted.
-    assert_eq!(expected.len(), 21);
+    assert_eq!(expected.len(), 25);
     said(&root.run(&["--prefix", "/usr", "--uninstall"]), true);
     assert!(root.is_empty(), "{:?}", root.files());
     let again = said(&root.run(&["--prefix", "/usr", "--uninstall"]), false);
@@ -265,6 +269,35 @@ fn what_was_replaced_by_others_since_stays_and_parts_that_are_not_renewed_too() 
     root.write("/usr/bin/ethercat", "the tool of another master\n");
     said(&root.run(&["--prefix", "/usr", "--uninstall"]), true);
     assert_eq!(root.files(), BTreeSet::from(["/usr/bin/ethercat".to_owned()]));
+}
+
+// covers: daemon
+#[test]
+fn files_of_a_package_are_neither_replaced_nor_removed() {
+    if Command::new("dpkg-query").arg("--version").output().is_err() {
+        println!("skipped: there is no dpkg-query");
+        return;
+    }
+    let root = Root::new();
+    root.install(&["--prefix", "/usr/local"]);
+    let (conf, tool) = ("/etc/ethercat.conf", "/usr/bin/ethercat");
+    let before = root.text(conf);
+    let status = "Package: other\nStatus: install ok installed\nMaintainer: a <a@b>\nArchitecture: all\nVersion: 1\n";
+    root.write("/var/lib/dpkg/status", &format!("{status}Description: a tool\n"));
+    root.write("/var/lib/dpkg/info/format", "1\n");
+    root.write("/var/lib/dpkg/info/other.list", &format!("/.\n{conf}\n{tool}\n"));
+    root.write(tool, "the tool of a package\n");
+    let all = root.files();
+    let programs = root.directory.join("programs");
+    let programs = ["--programs", programs.to_str().expect("text"), "--without-library", "--prefix", "/usr"];
+    let about = said(&root.run(&programs), false);
+    assert!(about.contains("/usr/bin/ethercat is of a package") && root.files() == all, "{about}");
+    let about = root.install(&["--prefix", "/usr/local"]);
+    assert!(about.contains("kept, because it is of a package"), "{about}");
+    said(&root.run(&["--prefix", "/usr/local", "--uninstall", "--purge"]), true);
+    let left: BTreeSet<String> = root.files().into_iter().filter(|file| !file.starts_with("/var/lib/dpkg")).collect();
+    assert_eq!((left, root.text(conf)), (BTreeSet::from([conf, tool].map(String::from)), before));
+    assert_eq!(root.text(tool), "the tool of a package\n");
 }
 
 // covers: daemon
