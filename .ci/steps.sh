@@ -2,14 +2,15 @@
 # `$logs` is a directory for files of this run.
 
 # What tests and benches use beyond the compiler: valgrind counts instructions, iproute2 makes the network namespaces
-# that tests on real interfaces run in, tshark reads captures, strace counts system calls. Packages are installed on the
-# machine of CI only.
+# that tests on real interfaces run in, tshark reads captures, strace counts system calls, pkg-config finds the library
+# that was installed. Packages are installed on the machine of CI only.
 root_layer() {
     local missing=()
     command -v valgrind >/dev/null || missing+=(valgrind)
     command -v ip >/dev/null || missing+=(iproute2)
     command -v tshark >/dev/null || missing+=(tshark)
     command -v strace >/dev/null || missing+=(strace)
+    command -v pkg-config >/dev/null || missing+=(pkg-config)
     if [[ ${#missing[@]} == 0 ]]; then
         echo "all here: $(valgrind --version), $(ip -V), $(tshark --version 2>/dev/null | head -n 1)"
     elif [[ ${CI:-} == true && $(id -u) == 0 ]]; then
@@ -190,6 +191,8 @@ release_programs() {
     # They change no feature of the crates that are built already.
     cargo build --release --package ringcat-cli --package scenarios --package ringcatd --package ringcat-ethercat --bins
     ci/ethercrab-client/build
+    # For the packages: the library of the C interface, alone, as crates/ffi/install builds it.
+    cargo rustc --release --package ringcat-ffi --lib --crate-type staticlib
 }
 
 # What `release_programs` said.
