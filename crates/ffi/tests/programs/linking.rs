@@ -51,6 +51,19 @@ fn both_command_lines_of_the_manual_link_without_a_further_library() {
 
 // covers: c-interface
 #[test]
+fn functions_of_the_archive_have_tables_of_unwinding() {
+    let Some(prefix) = installed() else { return };
+    for kind in ["-static", "-pie"] {
+        let program = target("unwinding");
+        let mut cc = Command::new("cc");
+        cc.arg(here().join("tests/c/unwinding.c")).arg("-I").arg(prefix.join("include")).arg(kind);
+        run(cc.arg("-o").arg(&program).arg(prefix.join("lib/libethercat.a")));
+        assert_eq!(run(&mut Command::new(&program)), "3\n", "{kind}");
+    }
+}
+
+// covers: c-interface
+#[test]
 fn the_archive_shows_the_functions_of_both_headers_only() {
     let Some(prefix) = installed() else { return };
     let archive = prefix.join("lib/libethercat.a");
