@@ -3,7 +3,7 @@
 
 # What tests and benches use beyond the compiler: valgrind counts instructions, iproute2 makes the network namespaces
 # that tests on real interfaces run in, tshark reads captures, strace counts system calls, pkg-config finds the library
-# that was installed. Packages are installed on the machine of CI only.
+# that was installed, ethercatctl needs procps. Packages are installed on the machine of CI only.
 root_layer() {
     local missing=()
     command -v valgrind >/dev/null || missing+=(valgrind)
@@ -11,6 +11,7 @@ root_layer() {
     command -v tshark >/dev/null || missing+=(tshark)
     command -v strace >/dev/null || missing+=(strace)
     command -v pkg-config >/dev/null || missing+=(pkg-config)
+    command -v ps >/dev/null || missing+=(procps)
     if [[ ${#missing[@]} == 0 ]]; then
         echo "all here: $(valgrind --version), $(ip -V), $(tshark --version 2>/dev/null | head -n 1)"
     elif [[ ${CI:-} == true && $(id -u) == 0 ]]; then
