@@ -15,7 +15,7 @@ pub enum Resend {
 /// The option.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct ResendArgument {
-    /// Send lost frames again within their cycle, such as always; or never
+    /// Send lost frames again within their cycle: always or never
     ///
     /// Works with one cycle under way (--under-way 1) and where the cycle has time for two round trips. SubDevices that
     /// take each write of outputs for an event, or have a SyncManager with one buffer, receive them once in a cycle;

@@ -88,10 +88,14 @@ pub const ELSEWHERE: [(&str, &str, &str); 8] = [
     ("start-up in virtual time", "bars in the program", "ci/bench (figures startup, figures phases)"),
     (
         "memory, CPU per simulated second",
-        "14 MiB (17 on the way); with 1,000 SubDevices 1 s by a fixed work",
+        "14 MiB (17 on the way); with 1,000 SubDevices 1 s, the lesser of as charged and by a fixed work",
         "ci/bench (scale)",
     ),
-    ("the same before and after", "+1 %", "docs/performance.md, section \"Before and after the model of the segment\""),
+    (
+        "the same before and after",
+        "+1 %, compared in the page",
+        "docs/performance.md, section \"Before and after the model of the segment\"",
+    ),
     ("scenarios; random explorers", "all pass", "cargo test --workspace; ci/explore --full"),
     ("packages of all published crates", "built", "ci/package"),
     ("pages and comments reviewed by a reader that did not write them", "all", REVIEWED),

@@ -18,7 +18,7 @@ use std::thread;
 use scenarios::answering_double::Cabling;
 use scenarios::callgrind::{Profile, is_installed, profile_self};
 use scenarios::cyclic_load::{CyclicLoad, LoadSpec};
-use scenarios::figures::{Figures, verdict};
+use scenarios::figures::{Figures, skipped, verdict};
 
 const SHORT: u64 = 1_000;
 const LONG: u64 = 3_000;
@@ -92,10 +92,7 @@ const CASES: [Case; 23] = [
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let result = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        [] if !is_installed() => {
-            println!("skipped: instructions per cycle, for valgrind is not installed");
-            Ok(true)
-        }
+        [] if !is_installed() => Ok(skipped("instructions per cycle, for valgrind is not installed")),
         [] => measure_all().map(|measured| print(&measured)),
         ["run", name, part, cycles] => run(name, part, cycles).map(|()| true),
         _ => Err(io::Error::other("usage: cycle [run CASE exchange|double CYCLES]")),

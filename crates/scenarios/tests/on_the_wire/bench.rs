@@ -10,6 +10,8 @@ use std::sync::mpsc::channel;
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use scenarios::figures::skipped;
+
 use crate::running::Running;
 use crate::said::Said;
 use crate::states;
@@ -113,7 +115,8 @@ impl Bench {
         let (main, sim) = (format!("ringcat{id}main"), format!("ringcat{id}sim"));
         let bench = Bench { main, sim, other: None, simulator: None, _alone: alone };
         if let Err(reason) = bench.build(pairs) {
-            println!("skipped: network namespaces need root and iproute2: {}", reason.trim());
+            let reason = format!("network namespaces need root and iproute2: {}", reason.trim());
+            assert!(skipped(&reason), "{reason}");
             return None;
         }
         Some(bench)

@@ -196,7 +196,7 @@ fn random() -> bool {
     figures.show("runs", format!("{RANDOM_RUNS} in {:.0} s", begin.elapsed().as_secs_f64()));
     figures.at_most("runs that do not hold", failed.len() as f64, 0.0, "runs");
     for seed in failed.iter().take(10) {
-        figures.show("  again with", format!("target/release/ring {seed}"));
+        figures.show("  again with", format!("target/release/figures ring {seed}"));
     }
     figures.print()
 }

@@ -15,7 +15,7 @@ use std::time::Duration;
 use ringcat::packet::{PacketLinks, ReceiveMode};
 use ringcat::standby::StoreAndForward;
 use ringcat::{Link, Links, realtime};
-use scenarios::figures::{Figures, median, verdict};
+use scenarios::figures::{Figures, median, skipped, verdict};
 use scenarios::namespaces::Namespaces;
 
 type Tried<T> = Result<T, String>;
@@ -58,8 +58,7 @@ fn in_a_namespace() -> Tried<bool> {
     let namespaces = match Namespaces::new() {
         Ok(namespaces) => namespaces,
         Err(reason) => {
-            println!("skipped: network namespaces need root and iproute2: {reason}");
-            return Ok(true);
+            return Ok(skipped(&format!("network namespaces need root and iproute2: {reason}")));
         }
     };
     let program = std::env::current_exe().map_err(said)?;

@@ -20,7 +20,7 @@ mod start_up;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use scenarios::figures::{Figures, verdict};
+use scenarios::figures::{Figures, skipped, verdict};
 use scenarios::namespaces::Namespaces;
 
 use crate::bench::{Tried, Wire};
@@ -41,8 +41,7 @@ fn main() -> ExitCode {
     let wire = match Namespaces::new() {
         Ok(namespaces) => Wire::new(namespaces, full),
         Err(reason) => {
-            println!("skipped: network namespaces need root and iproute2: {reason}");
-            return ExitCode::SUCCESS;
+            return verdict(skipped(&format!("network namespaces need root and iproute2: {reason}")));
         }
     };
     println!("{}", wire.others.missing());
