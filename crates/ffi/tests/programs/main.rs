@@ -16,4 +16,5 @@ mod machine;
 mod network;
 mod operator;
 mod readme;
+mod realtime;
 mod shape;
