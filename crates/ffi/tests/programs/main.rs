@@ -8,6 +8,7 @@ mod daemon;
 mod exits;
 mod fake;
 mod hosts;
+mod inside;
 mod library;
 mod linking;
 mod lossless;
