@@ -2,6 +2,7 @@
 //!
 //! The libraries are installed by `crates/ffi/install`. Without a C compiler the tests print a line and pass.
 
+mod arguments;
 mod beside;
 mod conformance;
 mod daemon;
