@@ -5,6 +5,7 @@
 mod arguments;
 mod beside;
 mod conformance;
+mod cut;
 mod daemon;
 mod exits;
 mod fake;
