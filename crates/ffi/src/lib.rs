@@ -9,7 +9,8 @@
 //! | questions, answered here or through a daemon | `responder` |
 //! | mutexes outside of the cyclic path | `locks` |
 //! | settings of a SubDevice, a network file, the declaration under construction | `settings`, `network`, `draft` |
-//! | a handle of a master: reservation, activation, cyclic calls | `master`, `active`, `live`, `claim`, `domain_words` |
+//! | a handle of a master: reservation, activation, cyclic calls | `master`, `active`, `claim` |
+//! | words that any thread reads | `live`, `domain_words` |
 //! | requests of the cyclic thread, blocking transfers, information | `request`, `mailbox`, `information` |
 //! | the functions of C | `c` |
 //!

@@ -27,7 +27,7 @@ static int round_of(int is_active)
     CHECK(ecrt_slave_config_reg_pdo_entry(sc, 0x7000, 1, domain, NULL) == 0);
     CHECK(ecrt_slave_config_sdo(sc, 0x8000, 1, data, sizeof data) == 0);
     CHECK(sdo = ecrt_slave_config_create_sdo_request(sc, 0x8000, 1, 2));
-    /* As in libethercat: sheet 6.4 has 32 characters. */
+    /* As in libethercat: protocol 6.5 has 32 characters. */
     CHECK(ecrt_slave_config_eoe_hostname(sc, "abcdefghijklmnopqrstuvwxyz012345") == 0);
     CHECK(ecrt_slave_config_eoe_hostname(sc, "abcdefghijklmnopqrstuvwxyz0123456") == -EINVAL);
     if (is_active)

@@ -1,7 +1,7 @@
 /*
- * Settings whose effects a test judges inside the SubDevices: says "refused" while the drive, which refuses SAFEOP once,
- * waits for a reset, "op" when all are in OP, and goes on after a line of its input with emergencies, a whole object and
- * a jump of the reference clock.
+ * Settings whose effects a test judges inside the SubDevices: says "refused" while the drive, which refuses SAFEOP
+ * once, waits for a reset, "op" when all are in OP, and goes on after a line of its input with emergencies, a whole
+ * object and a jump of the reference clock.
  */
 #include <arpa/inet.h>
 #include <errno.h>

@@ -1,7 +1,8 @@
 /*
  * realtime own|daemon: cyclic calls beside another thread. The functions that the manual marks as fit for a real-time
- * thread allocate nothing and call the system for frames alone; a second caller at the same time gets -EBUSY and nothing
- * breaks. With "own" receive and send are not counted: the segment that is simulated in this process allocates in them.
+ * thread allocate nothing and call the system for frames alone; a second caller at the same time gets -EBUSY and
+ * nothing breaks. With "own" receive and send are not counted: the segment that is simulated in this process allocates
+ * in them.
  *
  * While it counts, a write to no descriptor says in which part of the cycle the thread is, for a reader of its system
  * calls: "counted", "frames", "pause". The names of the functions follow at the end.
