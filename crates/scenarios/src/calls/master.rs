@@ -323,7 +323,9 @@ impl Ecrt {
     pub fn reset(&mut self) {
         self.note("reset");
         match &mut self.side {
-            Side::Idle(main_device) => drop(Services::retry(&mut **main_device, None)),
+            Side::Idle(main_device) => {
+                Services::retry(&mut **main_device, None);
+            }
             Side::Active(application) => Services::create_retry_request(&mut **application).start(),
             Side::Changing => {}
         }
