@@ -18,8 +18,8 @@ pub struct Live(RwLock<Option<Words>>);
 pub struct Words {
     /// States.
     pub status: LiveStatus,
-    /// Asks for another attempt of failed configurations.
-    pub retry: RetryRequest,
+    /// For another attempt of failed configurations.
+    retry: RetryRequest,
     /// SubDevices that the scan before the activation has found.
     found: u32,
     /// The links are a ring.
@@ -47,6 +47,17 @@ impl Live {
         let words = self.0.try_read().map_err(|_| Code::BUSY)?;
         let words = words.as_ref().ok_or(Code::BUSY)?;
         Ok(if words.ownership.as_ref().is_some_and(OwnershipWatch::is_taken_back) { lost } else { read(words) })
+    }
+
+    /// Asks for another attempt of failed configurations.
+    ///
+    /// # Errors
+    /// As [`Live::read`]; [`Code::GONE`]: the daemon has taken the bus back.
+    pub fn retry(&self) -> Outcome {
+        self.read(Err(Code::GONE), |words| {
+            words.retry.start();
+            Ok(())
+        })?
     }
 }
 

@@ -445,7 +445,7 @@ impl Master {
         if !self.is_active() {
             return self.bus()?.supervisor().retry(None).map(|_| ()).map_err(|_| Code::GONE);
         }
-        self.live(None, |live| Some(live.retry.start()))?.ok_or(Code::GONE)
+        self.live.retry()
     }
 
     /// Whether a clock takes part in the application.
