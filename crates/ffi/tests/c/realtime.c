@@ -131,7 +131,7 @@ static void of_the_bus(void)
     OK(ecrt_slave_config_state, (sc, &drive));
     OK(ecrt_master, (master, &info));
     OK(ecrt_master_scan_progress, (master, &progress));
-    wrongs += info.slave_count != AXES + 1 || !info.link_up || info.scan_busy || info.app_time != now_ns;
+    wrongs += info.slave_count != AXES + 1 || info.scan_busy || info.app_time != now_ns;
     wrongs += progress.slave_count != AXES + 1 || progress.scan_index != AXES + 1;
     OK(ecrt_master_reset, (master));
     wrongs += RT(ecrt_version_magic, ()) != ECRT_VERSION_MAGIC;
@@ -254,6 +254,14 @@ static int is_complete(void)
     return ecrt_domain_state(domain, &state) == 0 && state.wc_state == EC_WC_COMPLETE;
 }
 
+/* On a busy machine frames come late, and the link counts as down meanwhile. */
+static int is_up(void)
+{
+    ec_master_info_t info;
+
+    return ecrt_master(master, &info) == 0 && info.link_up;
+}
+
 static ec_slave_config_t *declare(uint16_t position)
 {
     ec_slave_info_t info;
@@ -304,11 +312,11 @@ int main(int argc, char **argv)
     CHECK(argc == 2);
     is_own = !strcmp(argv[1], "own");
     CHECK(configure() == 0);
-    for (i = 0; i < 10000 && !(drive.operational && is_complete()); i++) {
+    for (i = 0; i < 10000 && !(drive.operational && is_complete() && is_up()); i++) {
         cycle();
         CHECK(ecrt_slave_config_state(sc, &drive) == 0);
     }
-    CHECK(drive.operational && is_complete());
+    CHECK(drive.operational && is_complete() && is_up());
     measures = 1;
     for (i = 0; i < ROUNDS; i++)
         if (cycle()) {
