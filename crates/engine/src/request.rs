@@ -7,12 +7,14 @@
 
 mod errors;
 mod register;
+mod retry;
 mod sdo;
 mod slot;
 mod soe;
 mod voe;
 
 pub use register::RegisterRequest;
+pub use retry::RetryRequest;
 pub use sdo::SdoRequest;
 pub use slot::{Request, RequestFailure, RequestRefused, RequestState};
 pub use soe::SoeRequest;

@@ -7,7 +7,7 @@
 /* SDO abort code: the object does not exist. */
 #define NO_OBJECT 0x06020000U
 /* Longest name of a host, and drives behind a SubDevice. */
-#define MOST_NAME 64
+#define MOST_NAME 32
 #define LAST_DRIVE 7
 
 unsigned int ecrt_version_magic(void)

@@ -8,8 +8,14 @@
 /* Bound of the differences of clocks, as observed with version 1.6.2. */
 #define DIFFERENCE_NS 32U
 
+/* Released masters whose memory is kept with that of their handles: a late call finds the missing mark. */
+#define MOST_RELEASED 64U
+
 /* Masters of this process; not touched by cyclic calls. */
 static ec_master_t *masters;
+/* Those that were released, the newest first. */
+static ec_master_t *released;
+static unsigned int released_count;
 static pthread_mutex_t of_masters = PTHREAD_MUTEX_INITIALIZER;
 
 ec_master_t *ecrt_open_master(unsigned int master_index)
@@ -54,6 +60,24 @@ ec_master_t *ecrt_request_master(unsigned int master_index)
     return master;
 }
 
+/* Keeps a released master; the oldest one of too many is freed. With the lock of the masters. */
+static void keep_released(ec_master_t *master)
+{
+    ec_master_t **last = &released;
+
+    master->next = released;
+    released = master;
+    if (released_count < MOST_RELEASED) {
+        released_count++;
+        return;
+    }
+    while ((*last)->next)
+        last = &(*last)->next;
+    children_free((*last)->ended);
+    free(*last);
+    *last = NULL;
+}
+
 void ecrt_release_master(ec_master_t *master)
 {
     ec_master_t **at;
@@ -67,11 +91,10 @@ void ecrt_release_master(ec_master_t *master)
         ;
     if (*at)
         *at = master->next;
-    pthread_mutex_unlock(&of_masters);
     children_end(master);
-    children_free(master->ended);
     master->mark = MARK_ENDED;
-    free(master);
+    keep_released(master);
+    pthread_mutex_unlock(&of_masters);
 }
 
 static int check_reserved(const ec_master_t *master)

@@ -61,6 +61,8 @@ void children_end(struct ec_master *master)
 {
     struct child *child;
 
+    if (!master->children)
+        return;
     children_free(master->ended);
     for (child = master->children; child; child = child->next)
         child->mark = MARK_ENDED;

@@ -10,29 +10,26 @@ use ringcat::sim::network::Network;
 
 use crate::environment::Source;
 
-/// Links that this process opens: network interfaces, or a simulated segment.
-type OwnLinks = EitherLinks<PacketLinks, SharedSegment>;
-
-/// Links of one half: of this process, or of a daemon.
-pub type AnyLinks = EitherLinks<OwnLinks, DaemonLinks>;
+/// Links of one half: those of a daemon, network interfaces that this process opens, which are the same kind, or a
+/// simulated segment. Each cycle asks several times which kind it is: no kind is in it twice.
+pub type AnyLinks = EitherLinks<DaemonLinks, SharedSegment>;
 
 /// Opens the links of the cyclic and of the acyclic half.
 ///
 /// # Errors
 /// What is wrong, for the operator.
 pub fn open(source: &Source) -> Result<(AnyLinks, AnyLinks), String> {
-    let own = match source {
+    match source {
         Source::Simulated(file) => {
             let segment = ringcat::esi::load_segment(Path::new(file)).map_err(|error| error.to_string())?;
             let network = Network::from_description(segment).map_err(|error| error.to_string())?;
             let (cyclic, acyclic) = SharedSegment::halves(network);
-            (OwnLinks::Second(cyclic), OwnLinks::Second(acyclic))
+            Ok((AnyLinks::Second(cyclic), AnyLinks::Second(acyclic)))
         }
         Source::Interfaces(main, redundant) => {
             let opened = PacketLinks::open_halves(main, redundant.as_deref(), ReceiveMode::Blocking);
             let (cyclic, acyclic) = opened.map_err(|error| error.to_string())?;
-            (OwnLinks::First(cyclic), OwnLinks::First(acyclic))
+            Ok((AnyLinks::First(DaemonLinks::First(cyclic)), AnyLinks::First(DaemonLinks::First(acyclic))))
         }
-    };
-    Ok((AnyLinks::First(own.0), AnyLinks::First(own.1)))
+    }
 }

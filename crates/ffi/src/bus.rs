@@ -147,7 +147,7 @@ impl Bus {
         let mut owned = OwnedBus::take(socket, master, &program_name(), &options, realtime::leave)?;
         let other = |text: String| TakeError::Other(Code::GONE, text);
         let links = owned.take_links().ok_or_else(|| other("the daemon has handed over no links".to_owned()))?;
-        Bus::with(master, owned.supervisor().clone(), AnyLinks::Second(links), Some(owned)).map_err(other)
+        Bus::with(master, owned.supervisor().clone(), AnyLinks::First(links), Some(owned)).map_err(other)
     }
 
     fn with(

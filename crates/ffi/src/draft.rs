@@ -35,6 +35,11 @@ impl Draft {
         self.found = found;
     }
 
+    /// Number of SubDevices of that scan.
+    pub fn found_count(&self) -> usize {
+        self.found.len()
+    }
+
     /// The index of a SubDevice with a name, if it was declared before.
     ///
     /// # Errors

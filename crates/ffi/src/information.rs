@@ -3,7 +3,7 @@
 use std::ffi::c_char;
 
 use ringcat::daemon::known::{Description, PdoLine, PortLine, SyncManagerLine, ToolAnswer, ToolQuery};
-use ringcat::daemon::{Answer, Query};
+use ringcat::daemon::{Answer, Query, SegmentOverview};
 
 use crate::code::{Code, Outcome};
 use crate::responder::{Responder, code_of};
@@ -18,30 +18,22 @@ const STATE: u16 = 0x0F;
 const ERROR: u16 = 0x10;
 
 /// `ecrt_master`.
-///
-/// # Errors
-/// The bus does not answer.
-pub fn master(responder: &Responder, app_time: u64) -> Outcome<MasterInfo> {
-    let seen = responder.overview()?;
-    Ok(MasterInfo {
+pub fn master(seen: &SegmentOverview, app_time: u64) -> MasterInfo {
+    MasterInfo {
         slave_count: seen.found,
         link_up: seen.is_up.contains(&true).into(),
         scan_busy: seen.scans.into(),
         app_time,
         ..MasterInfo::default()
-    })
+    }
 }
 
 /// `ecrt_master_scan_progress`: while a scan runs, the index is 0.
-///
-/// # Errors
-/// The bus does not answer.
-pub fn scan_progress(responder: &Responder) -> Outcome<ScanProgress> {
-    let seen = responder.overview()?;
-    Ok(match seen.is_scanned {
+pub fn scan_progress(seen: &SegmentOverview) -> ScanProgress {
+    match seen.is_scanned {
         true => ScanProgress { slave_count: seen.found, scan_index: seen.found },
         false => ScanProgress { slave_count: seen.responding().into(), scan_index: 0 },
-    })
+    }
 }
 
 fn ask(responder: &Responder, what: Query) -> Outcome<Answer> {

@@ -9,7 +9,8 @@
 //! | questions, answered here or through a daemon | `responder` |
 //! | mutexes outside of the cyclic path | `locks` |
 //! | settings of a SubDevice, a network file, the declaration under construction | `settings`, `network`, `draft` |
-//! | a handle of a master: reservation, activation, cyclic calls | `master`, `active`, `claim`, `domain_words` |
+//! | a handle of a master: reservation, activation, cyclic calls | `master`, `active`, `claim` |
+//! | words that any thread reads | `live`, `domain_words` |
 //! | requests of the cyclic thread, blocking transfers, information | `request`, `mailbox`, `information` |
 //! | the functions of C | `c` |
 //!
@@ -29,6 +30,7 @@ mod environment;
 mod given_time;
 mod host;
 mod information;
+mod live;
 mod locks;
 mod mailbox;
 mod master;

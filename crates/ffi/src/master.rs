@@ -4,13 +4,12 @@
 //! application exists between activation and deactivation; cyclic calls use it by a claim that never waits.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, RwLock};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use ringcat::daemon::{ClientError, OwnershipWatch};
+use ringcat::daemon::{ClientError, SegmentOverview};
 use ringcat::{
-    ClockDatagrams, Declaration, DomainId, Instant, LastOutputs, Link, Links, LiveStatus, ReferenceClock, Services,
-    SubDeviceId,
+    ClockDatagrams, Declaration, DomainId, Instant, LastOutputs, Link, Links, ReferenceClock, Services, SubDeviceId,
 };
 
 use crate::active::{Active, Slot};
@@ -21,6 +20,7 @@ use crate::draft::Draft;
 use crate::environment::socket;
 use crate::given_time::{GivenTimes, passed_since};
 use crate::host::{check_memory, variable, watch_forks};
+use crate::live::{Live, Words};
 use crate::locks::locked;
 use crate::network::Network;
 use crate::responder::{DaemonResponder, Responder};
@@ -69,8 +69,7 @@ pub struct Master {
     is_ring: AtomicBool,
     draft: Mutex<Draft>,
     application: Claim<Slot>,
-    /// Of the bus, while this handle has one.
-    live: RwLock<Option<(LiveStatus, Option<OwnershipWatch>)>>,
+    live: Live,
     /// The last time of the application; 0 before.
     application_time: AtomicU64,
     /// Times before activation.
@@ -99,7 +98,7 @@ impl Master {
             is_ring: AtomicBool::new(false),
             draft: Mutex::default(),
             application: Claim::new(Slot::Empty),
-            live: RwLock::default(),
+            live: Live::default(),
             application_time: AtomicU64::new(0),
             given: Mutex::default(),
             memory: Mutex::default(),
@@ -301,7 +300,7 @@ impl Master {
         if let Some((time, at)) = last {
             application.set_application_time(time.wrapping_add(passed_since(at)), now);
         }
-        self.follow_live_status(bus);
+        self.live.follow(bus, draft.found_count(), self.is_ring());
         let begun = Active::new(application, self.has_clock.load(Ordering::Relaxed), bus.ownership());
         self.application.use_within(CLAIM_LIMIT, |slot| *slot = Slot::Active(begun))
     }
@@ -316,12 +315,6 @@ impl Master {
                 memory
             }
             None => Vec::leak(vec![0; bytes.next_multiple_of(MEMORY_GRAIN)]),
-        }
-    }
-
-    fn follow_live_status(&self, bus: &Bus) {
-        if let (Ok(fresh), Ok(mut live)) = (bus.supervisor().live_status(), self.live.write()) {
-            *live = Some((fresh, bus.ownership()));
         }
     }
 
@@ -355,7 +348,7 @@ impl Master {
         draft.clear();
         self.application_time.store(0, Ordering::Relaxed);
         *locked(&self.given) = GivenTimes::default();
-        self.follow_live_status(&bus);
+        self.live.follow(&bus, 0, false);
         self.is_active.store(false, Ordering::Release);
         draft.set_found(bus.found()?);
         Ok(())
@@ -409,16 +402,7 @@ impl Master {
             if link == Some(Link::Redundant) && !self.is_ring() {
                 return Err(Code::INVALID);
             }
-            return self.live(SegmentState::default(), |live| match link {
-                None => {
-                    let all = live.segment();
-                    SegmentState::new(all.responding, all.al_states, all.is_up)
-                }
-                Some(link) => {
-                    let one = live.link(link);
-                    SegmentState::new(one.answering, one.al_states, one.is_up())
-                }
-            });
+            return self.live(SegmentState::default(), |live| live.segment(link));
         }
         let seen = self.responder()?.overview()?;
         if link == Some(Link::Redundant) && !seen.is_ring {
@@ -437,10 +421,31 @@ impl Master {
     ///
     /// # Errors
     /// Another thread activates or deactivates it.
-    pub fn live<R>(&self, lost: R, read: impl FnOnce(&LiveStatus) -> R) -> Outcome<R> {
-        let live = self.live.try_read().map_err(|_| Code::BUSY)?;
-        let (status, ownership) = live.as_ref().ok_or(Code::BUSY)?;
-        Ok(if ownership.as_ref().is_some_and(OwnershipWatch::is_taken_back) { lost } else { read(status) })
+    pub fn live<R>(&self, lost: R, read: impl FnOnce(&Words) -> R) -> Outcome<R> {
+        self.live.read(lost, read)
+    }
+
+    /// What is seen of all SubDevices: words while the application of this handle is active, otherwise an answer.
+    ///
+    /// # Errors
+    /// As [`Master::live`] and [`Master::responder`]; the answer does not come.
+    pub fn overview(&self) -> Outcome<SegmentOverview> {
+        if !self.is_active() {
+            return self.responder()?.overview();
+        }
+        self.live(None, |live| Some(live.overview()))?.ok_or(Code::GONE)
+    }
+
+    /// Repeats failed configurations. While the application is active the acyclic half only gets a word.
+    ///
+    /// # Errors
+    /// The handle has not reserved the bus; as [`Master::live`]; the acyclic half has ended.
+    pub fn reset(&self) -> Outcome {
+        self.check_reserved()?;
+        if !self.is_active() {
+            return self.bus()?.supervisor().retry(None).map(|_| ()).map_err(|_| Code::GONE);
+        }
+        self.live.retry()
     }
 
     /// Whether a clock takes part in the application.

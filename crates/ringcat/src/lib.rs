@@ -212,8 +212,8 @@ pub use ringcat_engine::main_device::{
 };
 pub use ringcat_engine::main_device::{Denial, MainDeviceRole, NotPermitted};
 pub use ringcat_engine::request::{
-    RegisterRequest, Request, RequestFailure, RequestRefused, RequestState, SdoRequest, SoeRequest, VoeHandler,
-    VoeHeader,
+    RegisterRequest, Request, RequestFailure, RequestRefused, RequestState, RetryRequest, SdoRequest, SoeRequest,
+    VoeHandler, VoeHeader,
 };
 pub use ringcat_engine::ring_status::{
     Cable, CableErrors, CableReport, LinkCounts, LinkStatus, Redundancy, RedundancyLoss, RingStatus,

@@ -23,7 +23,7 @@ use ringcat_engine::main_device::{
     Address, Function, LiveStatus, MainDevice as Engine, MainDevicePhase, MainDeviceRole, Pending, Permission,
     RawDatagram,
 };
-use ringcat_engine::request::{RegisterRequest, SdoRequest, SoeRequest, VoeHandler};
+use ringcat_engine::request::{RegisterRequest, RetryRequest, SdoRequest, SoeRequest, VoeHandler};
 use ringcat_engine::{BusError, Reply};
 use ringcat_engine::{RingInspection, ScanError, inspect_ring};
 use ringcat_engine::{StateScope, StatesError};
@@ -251,6 +251,12 @@ pub trait Services: Sized {
     /// there is no such SubDevice.
     fn retry(self, subdevice: Option<Address>) -> Self::Immediate<bool> {
         self.immediately(EngineKey, move |engine| engine.retry(subdevice))
+    }
+
+    /// Creates a request for another attempt of all failed configurations, which a cyclic thread starts while an
+    /// application is active ([`Services::retry`] sends a message).
+    fn create_retry_request(self) -> Self::Immediate<RetryRequest> {
+        self.immediately(EngineKey, |engine| engine.create_retry_request())
     }
 
     /// Brings all SubDevices to INIT, PREOP, SAFEOP or OP and waits until they are there: while an application is

@@ -18,16 +18,25 @@ use crate::mail::coe::{self, SdoAddress, SdoError, SdoFailure};
 use crate::mail::soe::{self, SoeAddress, SoeError, SoeFailure};
 use crate::mail::voe::{self, Voe};
 use crate::mail::{Limits, Mailbox, MailboxError};
-use crate::request::{Access, AcyclicSide, Order, RequestFailure, Subject};
+use crate::request::{Access, AcyclicSide, Order, RequestFailure, RetryRequest, Subject};
 use crate::role::Function;
+use crate::segment::Observation;
 use crate::supervisor::{Bus, Signal};
 use crate::time::Instant;
 
 /// Open requests. A request whose handle was dropped is removed.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct Requests {
     all: Rc<RefCell<Vec<AcyclicSide>>>,
+    retry: RetryRequest,
     bell: Bell,
+}
+
+impl Default for Requests {
+    fn default() -> Requests {
+        let bell = Bell::default();
+        Requests { all: Rc::default(), retry: RetryRequest::new(bell.clone()), bell }
+    }
 }
 
 impl Requests {
@@ -42,8 +51,14 @@ impl Requests {
         &self.bell
     }
 
-    /// Fails the requests that wait or are under way.
+    /// With it a cyclic thread asks that failed configurations are repeated.
+    pub(crate) fn retry(&self) -> &RetryRequest {
+        &self.retry
+    }
+
+    /// Fails the requests that wait or are under way. A wish for another attempt ends with its application.
     pub(crate) fn end(&self) {
+        self.retry.take();
         self.all.borrow().iter().for_each(AcyclicSide::end);
     }
 
@@ -65,6 +80,9 @@ pub(crate) async fn serve_requests(bus: Bus, segment: SharedSegment, requests: R
         let posted = bus.posted();
         if requests.any_cancelled() {
             cancelled.notify();
+        }
+        if requests.retry.take() {
+            segment.observe(Observation::Retried(None));
         }
         for (served, order) in requests.ordered() {
             match target(&segment, order.subdevice) {

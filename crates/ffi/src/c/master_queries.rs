@@ -3,7 +3,7 @@
 use std::ffi::{c_int, c_uint};
 use std::time::Duration;
 
-use ringcat::{Link, Services};
+use ringcat::Link;
 
 use super::handle::call;
 use super::memory::put;
@@ -15,7 +15,7 @@ use crate::types::{MasterInfo, PdoEntryInfo, PdoInfo, ScanProgress, SegmentState
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_master(handle: *mut ec_master_t, master_info: *mut MasterInfo) -> c_int {
     let ask = |MasterObject(owner): &MasterObject| {
-        let info = master(&*owner.master.responder()?, owner.master.application_time())?;
+        let info = master(&owner.master.overview()?, owner.master.application_time());
         // SAFETY: memory for the result, or NULL (ecrt.h).
         unsafe { put(master_info, info) }
     };
@@ -26,7 +26,7 @@ unsafe extern "C" fn ecrt_master(handle: *mut ec_master_t, master_info: *mut Mas
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_master_scan_progress(handle: *mut ec_master_t, progress: *mut ScanProgress) -> c_int {
     // SAFETY: a handle of the library, memory for the result or NULL (ecrt.h).
-    unsafe { call(handle, |master| put(progress, scan_progress(&*master.0.master.responder()?)?)) }
+    unsafe { call(handle, |master| put(progress, scan_progress(&master.0.master.overview()?))) }
 }
 
 #[unsafe(no_mangle)]
@@ -115,12 +115,8 @@ unsafe extern "C" fn ecrt_master_get_pdo_entry(
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_master_reset(handle: *mut ec_master_t) -> c_int {
-    let reset = |MasterObject(owner): &MasterObject| {
-        owner.master.check_reserved()?;
-        owner.master.bus()?.supervisor().retry(None).map(|_| ()).map_err(|_| Code::GONE)
-    };
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { call(handle, reset) }
+    unsafe { call(handle, |master| master.0.master.reset()) }
 }
 
 #[unsafe(no_mangle)]

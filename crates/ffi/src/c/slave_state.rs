@@ -26,8 +26,9 @@ fn state_of(slave: &SlaveObject) -> Outcome<SlaveConfigState> {
         SlaveConfigState(c_uint::from(online) | c_uint::from(operational) << 1 | c_uint::from(al_state & 0x0F) << 2)
     };
     if master.is_active() {
-        let status =
-            master.live(Some(SubDeviceStatus::default()), |live| live.subdevice(slave.id()))?.ok_or(Code::NOT_FOUND)?;
+        let status = master
+            .live(Some(SubDeviceStatus::default()), |live| live.status.subdevice(slave.id()))?
+            .ok_or(Code::NOT_FOUND)?;
         return Ok(pack(status.online, status.operational, status.al_state.map_or(0, |state| state.code())));
     }
     let position = master.look(|draft| draft.info(slave.index).map(|info| info.position))?;

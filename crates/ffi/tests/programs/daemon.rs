@@ -5,6 +5,7 @@ use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -65,9 +66,12 @@ fn schedule(network: &mut Network, frames: &mut u64, fault: &Mutex<Option<(Fault
     }
 }
 
+type Look = Box<dyn FnOnce(&mut PipedSegment) + Send>;
+
 /// A daemon on the segment of a file.
 pub struct Bench {
     seen: Arc<Seen>,
+    looks: Sender<Look>,
     daemon: Option<Daemon>,
     segment: Option<JoinHandle<()>>,
     socket: PathBuf,
@@ -91,6 +95,7 @@ impl Bench {
         let (near, far) = UnixStream::pair().expect("a pair");
         let (seen, file) = (Arc::new(Seen::default()), file.to_owned());
         let shown = seen.clone();
+        let (looks, asked) = channel::<Look>();
         let segment = std::thread::spawn(move || {
             let described = load_segment(&file).expect("it is right");
             let mut segment = PipedSegment::new(Network::from_description(described).expect("it is right"));
@@ -98,6 +103,7 @@ impl Bench {
             let mut last = Instant::now();
             let show = |segment: &mut PipedSegment| {
                 schedule(segment.network_mut(), &mut frames, &shown.fault);
+                asked.try_iter().for_each(|look| look(segment));
                 if last.elapsed() > STALL {
                     shown.stalls.lock().expect("no panic").push((monotonic_ns(), last.elapsed()));
                 }
@@ -115,7 +121,15 @@ impl Bench {
         let socket = std::env::temp_dir().join(format!("ringcat-ffi-{name}-{}", std::process::id()));
         let master = Master::new(0, name.to_owned(), Wires::to_segment(near).expect("it is right"));
         let daemon = Daemon::start(vec![master], &socket, rights, STOP_LIMIT).expect("it listens");
-        Bench { seen, daemon: Some(daemon), segment: Some(segment), socket }
+        Bench { seen, looks, daemon: Some(daemon), segment: Some(segment), socket }
+    }
+
+    /// Looks into the segment, or changes it.
+    pub fn inside<T: Send + 'static>(&self, look: impl FnOnce(&mut PipedSegment) -> T + Send + 'static) -> T {
+        let (answer, answered) = channel();
+        let look = move |segment: &mut PipedSegment| answer.send(look(segment)).expect("the test waits");
+        self.looks.send(Box::new(look)).expect("the segment runs");
+        answered.recv().expect("the segment runs")
     }
 
     pub fn wait_for_preop(&self) {

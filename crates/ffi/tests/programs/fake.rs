@@ -171,6 +171,22 @@ fn the_first_application_reaches_op_at_once_on_the_fake_library() {
     }
 }
 
+/// Under memcheck where it is installed: it would find memory that was freed.
+// covers: c-interface
+#[test]
+fn late_calls_to_a_released_master_are_refused_by_the_fake_library() {
+    let Some(released) = program(&here().join("tests/c/fake_released.c"), &["-Wl,--enable-new-dtags"]) else { return };
+    let place = Place::new("released");
+    let has_memcheck = Command::new("valgrind").arg("--version").output().is_ok();
+    if has_memcheck {
+        let mut command = place.command(Path::new("valgrind"), "released");
+        finish(command.args(["--quiet", "--error-exitcode=9", "--leak-check=full"]).arg(&released));
+    } else {
+        println!("skipped: memcheck, for there is no valgrind");
+        finish(&mut place.command(&released, "released"));
+    }
+}
+
 // covers: c-interface
 #[test]
 fn the_fake_library_is_clean_under_memcheck() {

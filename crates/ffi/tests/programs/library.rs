@@ -51,6 +51,13 @@ pub fn run(command: &mut Command) -> String {
     text
 }
 
+/// An installation of the archive of these tests.
+pub fn installation() -> Command {
+    let mut install = Command::new(here().join("install"));
+    install.arg("--archive").arg(archive());
+    install
+}
+
 /// Where `crates/ffi/install` has put everything; `None` without a C compiler.
 pub fn installed() -> Option<&'static Path> {
     static PREFIX: OnceLock<Option<PathBuf>> = OnceLock::new();
@@ -60,8 +67,7 @@ pub fn installed() -> Option<&'static Path> {
             return None;
         }
         let prefix = workshop().join("prefix");
-        let mut install = Command::new(here().join("install"));
-        run(install.arg("--archive").arg(archive()).arg("--prefix").arg(&prefix));
+        run(installation().arg("--prefix").arg(&prefix));
         Some(prefix)
     });
     installed.as_deref()
@@ -70,8 +76,7 @@ pub fn installed() -> Option<&'static Path> {
 /// Installs everything for a prefix of a running system below a directory, as packages do; `None` without a C compiler.
 pub fn installed_below(directory: &Path, prefix: &str) -> Option<()> {
     installed()?;
-    let mut install = Command::new(here().join("install"));
-    run(install.arg("--archive").arg(archive()).args(["--prefix", prefix]).arg("--destdir").arg(directory));
+    run(installation().args(["--prefix", prefix]).arg("--destdir").arg(directory));
     Some(())
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::library::{here, installed, installed_below, on_segment, run, workshop};
+use crate::library::{here, installation, installed, installed_below, on_segment, run, workshop};
 
 /// A C compiler for the smallest program, in a directory of its own.
 fn cc(prefix: &Path) -> Command {
@@ -167,6 +167,33 @@ fn the_prefix_of_the_manual_has_its_layout_and_no_file_names_the_build() {
     assert_eq!(found, expected.map(|path| format!("opt/etherlab/{path}")));
     let pc = std::fs::read_to_string(place.join("opt/etherlab/lib/pkgconfig/libethercat.pc")).expect("it is there");
     assert!(pc.starts_with("prefix=/opt/etherlab\n"), "{pc}");
+}
+
+/// Those of another processor, as for a cross compilation: each tool leaves its name here, and works for this one.
+// covers: c-interface
+#[test]
+fn an_installation_uses_the_tools_that_are_named() {
+    use std::os::unix::fs::PermissionsExt;
+
+    if installed().is_none() {
+        return;
+    }
+    let place = target("tools");
+    std::fs::create_dir_all(&place).expect("a directory");
+    let used = place.join("used");
+    let _ = std::fs::remove_file(&used);
+    let mut install = installation();
+    let tools = [("CC", "cc"), ("OBJCOPY", "objcopy"), ("STRIP", "strip"), ("NM", "nm"), ("AR", "ar")];
+    for (variable, tool) in tools {
+        let path = place.join(format!("other-{tool}"));
+        let text = format!("#!/bin/sh\necho {tool} >> '{}'\nexec {tool} \"$@\"\n", used.display());
+        std::fs::write(&path, text).expect("a file");
+        std::fs::set_permissions(&path, PermissionsExt::from_mode(0o755)).expect("permissions");
+        install.env(variable, path);
+    }
+    run(install.arg("--prefix").arg(place.join("prefix")));
+    let used = std::fs::read_to_string(used).expect("a tool was used");
+    assert_eq!(used.lines().collect::<BTreeSet<_>>(), tools.map(|(_, tool)| tool).into());
 }
 
 // covers: c-interface

@@ -1,4 +1,4 @@
-//! Whole programs on simulated machines: the examples, all services, cycles without allocation.
+//! Whole programs on simulated machines: the examples, all services.
 
 use crate::library::{here, on_segment, outputs, program, root, workshop};
 
@@ -95,14 +95,6 @@ fn each_service_does_its_work_on_simulated_subdevices() {
     let (output, ended) = on_segment(&services, &here().join("tests/c/services.toml"), &[]);
     assert_eq!(ended, Ok(()), "{output}");
     assert_eq!(output.lines().last(), Some("all services work"), "{output}");
-}
-
-// covers: c-interface, no-allocation
-#[test]
-fn cyclic_calls_allocate_nothing_and_a_second_caller_is_refused() {
-    let Some(realtime) = program(&here().join("tests/c/realtime.c"), &[]) else { return };
-    let (output, ended) = on_segment(&realtime, &here().join("tests/c/services.toml"), &[]);
-    assert_eq!(ended, Ok(()), "{output}");
 }
 
 // covers: c-interface

@@ -2,12 +2,15 @@
 //!
 //! The libraries are installed by `crates/ffi/install`. Without a C compiler the tests print a line and pass.
 
+mod arguments;
 mod beside;
 mod conformance;
+mod cut;
 mod daemon;
 mod exits;
 mod fake;
 mod hosts;
+mod inside;
 mod library;
 mod linking;
 mod lossless;
@@ -16,4 +19,5 @@ mod machine;
 mod network;
 mod operator;
 mod readme;
+mod realtime;
 mod shape;

@@ -323,10 +323,12 @@ impl Ecrt {
     pub fn reset(&mut self) {
         self.note("reset");
         match &mut self.side {
-            Side::Idle(main_device) => Services::retry(&mut **main_device, None),
-            Side::Active(application) => Services::retry(&mut **application, None),
-            Side::Changing => false,
-        };
+            Side::Idle(main_device) => {
+                Services::retry(&mut **main_device, None);
+            }
+            Side::Active(application) => Services::create_retry_request(&mut **application).start(),
+            Side::Changing => {}
+        }
     }
 
     /// States of all devices, as text.

@@ -11,7 +11,7 @@ use crate::main_device::pending::Pending;
 use crate::procedures::configure::ConfigureError;
 use crate::procedures::request_state::request_state;
 use crate::procedures::undeclared::request;
-use crate::request::{RegisterRequest, SdoRequest, SoeRequest, VoeHandler};
+use crate::request::{RegisterRequest, RetryRequest, SdoRequest, SoeRequest, VoeHandler};
 use crate::role::Function;
 use crate::segment::Addressed;
 
@@ -86,6 +86,12 @@ impl MainDevice {
         let (handler, served) = VoeHandler::new(subdevice.into(), size, self.requests.bell());
         self.requests.add(served);
         handler
+    }
+
+    /// A request for another attempt of failed configurations, while a declaration is active. [`MainDevice::retry`]
+    /// needs the MainDevice itself.
+    pub fn create_retry_request(&mut self) -> RetryRequest {
+        self.requests.retry().clone()
     }
 
     /// The emergencies of a SubDevice, for any thread: by its index in the declaration, before or after activation, or
