@@ -5,6 +5,7 @@
 //! * [`shape`]: the description of a command; [`commands`]: all commands, also by abbreviation; [`help`]: their use;
 //! * [`completion`], [`manual`]: scripts for shells and manual pages, from [`options_help`] and the same help;
 //! * [`standalone`]: a bus without a daemon, for one command;
+//! * [`progress`]: a bar while a command waits;
 //! * [`session`]: the daemon and its masters; [`selection`]: SubDevices by alias and position;
 //! * [`data_types`]: values of objects, registers and IDNs; [`aborts`]: codes of refusals;
 //! * `command`: one file per command; `json`: what they print with `--json`.
@@ -29,6 +30,7 @@ pub mod manual;
 pub mod numbers;
 pub mod options_help;
 mod order;
+pub mod progress;
 pub mod selection;
 pub mod selection_help;
 pub mod session;

@@ -16,4 +16,5 @@ mod outputs;
 mod ring_and_clocks;
 mod several;
 mod shells;
+mod siis;
 mod standalone;
