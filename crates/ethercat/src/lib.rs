@@ -31,6 +31,7 @@ pub mod numbers;
 pub mod options_help;
 mod order;
 pub mod progress;
+mod screen;
 pub mod selection;
 pub mod selection_help;
 pub mod session;
@@ -85,8 +86,13 @@ fn try_run(words: &[OsString], socket: &Path, output: &mut dyn Write, errors: &m
         output.write_all(help::of(command).as_bytes())?;
         return Ok(());
     }
-    if arguments.json && command.output == Output::Nothing {
-        let failure = Failure::usage(format!("'{}' prints no data: it has no --json!", command.name));
+    let without_json = match command.output {
+        Output::Data => None,
+        Output::Table => Some("is for people"),
+        Output::Nothing => Some("prints no data"),
+    };
+    if let (true, Some(why)) = (arguments.json, without_json) {
+        let failure = Failure::usage(format!("'{}' {why}: it has no --json!", command.name));
         return Err(failure.with_help(|| help::of(command)));
     }
     let links = standalone::links(&arguments).map_err(wrong)?;

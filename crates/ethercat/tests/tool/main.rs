@@ -18,3 +18,4 @@ mod several;
 mod shells;
 mod siis;
 mod standalone;
+mod terminal;
