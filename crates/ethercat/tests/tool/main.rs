@@ -17,5 +17,6 @@ mod ring_and_clocks;
 mod several;
 mod shells;
 mod siis;
+mod situations;
 mod standalone;
 mod terminal;
