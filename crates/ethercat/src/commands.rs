@@ -111,7 +111,7 @@ mod tests {
         assert_eq!(names("dw"), ["download"]);
         assert!(names("xyz").is_empty());
         assert_eq!(
-            [names("ev"), names("cl"), names("ring"), names("w")].concat(),
+            [names("ev"), names("cl"), names("ring"), names("wat")].concat(),
             ["events", "clocks", "ring", "watch"]
         );
         assert_eq!(names("r"), ["reg_read", "reg_write", "rescan"]);
