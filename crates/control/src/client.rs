@@ -272,7 +272,7 @@ mod tests {
 
     // covers: daemon
     #[test]
-    fn who_waits_for_an_answer_is_called_meanwhile() {
+    fn a_wait_for_an_answer_calls_back_meanwhile() {
         let (near, far) = UnixStream::pair().expect("a pair");
         let connection = Connection::new(near).expect("it is open");
         let mut client = Client { connection, right: Right::Read, daemon_pid: 0, next: 0 };

@@ -61,7 +61,7 @@ impl<'a> Bar<'a> {
         let columns = terminal::size(io::stderr().as_fd()).map_or(USUAL_COLUMNS, |(columns, _)| columns.into());
         // Without the last column: a terminal would begin a line behind it.
         let text: String = text(self.name, &line).chars().take(columns.saturating_sub(1)).collect();
-        // Where the standard error is closed nobody looks at it.
+        // Where the standard error is closed it has no reader.
         let _ = write!(output, "\r{text}\x1b[K").and_then(|()| output.flush());
         self.is_drawn = true;
     }

@@ -19,6 +19,7 @@ use crate::several::ring;
 const CYCLE: Duration = Duration::from_millis(1);
 /// Removes a bar: the beginning of the line, and nothing behind it.
 const REMOVED: &str = "\r\u{1b}[K";
+const OPEN: &str = "  ring        OPEN: the next break isolates slaves";
 /// Bytes of a file and of an object that take longer than a second.
 const FILE: usize = 100_000;
 const OBJECT: usize = 40_000;
@@ -160,7 +161,7 @@ fn a_live_table_follows_the_bus_and_the_size_of_the_terminal() {
     assert!(std::fs::read_to_string(bench.directory.join("before")).expect("it is there").contains("columns 80"));
     bench.inside(0, |segment| segment.network_mut().apply(Fault::Cut(CableId(2))));
     let at =
-        terminal.wait_for("  ring        OPEN: the next break isolates slaves\u{1b}[K\r\r\n  links       MAIN 2 slaves, REDUNDANT 4 slaves\u{1b}[K", at);
+        terminal.wait_for(&format!("{OPEN}\u{1b}[K\r\r\n  links       MAIN 2 slaves, REDUNDANT 4 slaves\u{1b}[K"), at);
     bench.inside(0, |segment| segment.network_mut().apply(Fault::Heal(CableId(2))));
     let at = terminal.wait_for("  ring        closed\u{1b}[K\r\r\n  links       MAIN 6 slaves, ", at);
     bench.inside(1, |segment| segment.network_mut().apply(Fault::PowerOff(DeviceIndex(1))));

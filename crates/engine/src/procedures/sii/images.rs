@@ -1,6 +1,6 @@
-//! Whole EEPROMs as they were read, for the next one who asks.
+//! Whole EEPROMs as they were read, for the next question.
 //!
-//! An image is shown again only where the EEPROM is certainly unchanged. Whoever reads or writes an EEPROM, on either
+//! An image is shown again only where the EEPROM is certainly unchanged. Each read or write of an EEPROM, from either
 //! side of the controller, changes the address register of its SII interface, and a start clears it. After each read
 //! the registers of address and data therefore get a number that no other image has, the mark. While the mark is there
 //! the interface has had no command since. Vendor, product, revision, serial number and the words that the controller
