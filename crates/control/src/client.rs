@@ -158,12 +158,13 @@ impl Client {
         let limit = what.limit() + BEYOND;
         let content = Content::Query(Numbered { id: self.next, master, what });
         self.connection.send(&Message { content, bytes })?;
-        let begin = Instant::now();
         loop {
-            while wait_readable(&[self.connection.as_fd()], every) == 0 && begin.elapsed() < limit {
+            let (begin, mut left) = (Instant::now(), limit);
+            while wait_readable(&[self.connection.as_fd()], every.min(left)) == 0 && !left.is_zero() {
                 meanwhile();
+                left = limit.saturating_sub(begin.elapsed());
             }
-            let message = self.connection.receive(Limits::OWNER, Some(limit))?;
+            let message = self.connection.receive(Limits::OWNER, Some(left.max(PAUSE)))?;
             match message.content {
                 Content::Answer(answer) if answer.id == self.next => {
                     return answer.what.map(|answer| (answer, message.bytes)).map_err(ClientError::Refused);
