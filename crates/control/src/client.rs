@@ -139,12 +139,32 @@ impl Client {
     /// # Errors
     /// The daemon refuses, or does not answer in time: within a minute, or 10 minutes where flash memory is written.
     pub fn ask(&mut self, master: u32, what: Query, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), ClientError> {
+        let limit = what.limit() + BEYOND;
+        self.ask_meanwhile(master, what, bytes, (limit, &mut || ()))
+    }
+
+    /// As [`Client::ask`]; `meanwhile` is called each time that nothing has come for so long.
+    ///
+    /// # Errors
+    /// As [`Client::ask`].
+    pub fn ask_meanwhile(
+        &mut self,
+        master: u32,
+        what: Query,
+        bytes: Vec<u8>,
+        (every, meanwhile): (Duration, &mut dyn FnMut()),
+    ) -> Result<(Answer, Vec<u8>), ClientError> {
         self.next = self.next.wrapping_add(1);
         let limit = what.limit() + BEYOND;
         let content = Content::Query(Numbered { id: self.next, master, what });
         self.connection.send(&Message { content, bytes })?;
         loop {
-            let message = self.connection.receive(Limits::OWNER, Some(limit))?;
+            let (begin, mut left) = (Instant::now(), limit);
+            while wait_readable(&[self.connection.as_fd()], every.min(left)) == 0 && !left.is_zero() {
+                meanwhile();
+                left = limit.saturating_sub(begin.elapsed());
+            }
+            let message = self.connection.receive(Limits::OWNER, Some(left.max(PAUSE)))?;
             match message.content {
                 Content::Answer(answer) if answer.id == self.next => {
                     return answer.what.map(|answer| (answer, message.bytes)).map_err(ClientError::Refused);
@@ -162,9 +182,23 @@ impl Client {
     /// # Errors
     /// As [`Client::ask`].
     pub fn ask_patiently(&mut self, master: u32, what: &Query, bytes: &[u8]) -> Result<(Answer, Vec<u8>), ClientError> {
+        self.ask_patiently_meanwhile(master, what, bytes, (what.limit() + BEYOND, &mut || ()))
+    }
+
+    /// As [`Client::ask_patiently`] and [`Client::ask_meanwhile`].
+    ///
+    /// # Errors
+    /// As [`Client::ask`].
+    pub fn ask_patiently_meanwhile(
+        &mut self,
+        master: u32,
+        what: &Query,
+        bytes: &[u8],
+        (every, meanwhile): (Duration, &mut dyn FnMut()),
+    ) -> Result<(Answer, Vec<u8>), ClientError> {
         let begin = Instant::now();
         loop {
-            match self.ask(master, what.clone(), bytes.to_vec()) {
+            match self.ask_meanwhile(master, what.clone(), bytes.to_vec(), (every, &mut *meanwhile)) {
                 Err(ClientError::Refused(Refusal::Changing { .. } | Refusal::TooManyQueries { .. }))
                     if begin.elapsed() < CHANGE =>
                 {
@@ -235,6 +269,26 @@ mod tests {
         let (answered, questions) = ask(vec![Refusal::Changing { master: 0 }; 3]);
         assert!(matches!(answered, Ok((Answer::Masters(_), _))), "{answered:?}");
         assert_eq!(questions, 4);
+    }
+
+    // covers: daemon
+    #[test]
+    fn a_wait_for_an_answer_calls_back_meanwhile() {
+        let (near, far) = UnixStream::pair().expect("a pair");
+        let connection = Connection::new(near).expect("it is open");
+        let mut client = Client { connection, right: Right::Read, daemon_pid: 0, next: 0 };
+        let daemon = Connection::new(far).expect("it is open");
+        let mut calls = 0;
+        let mut meanwhile = || {
+            calls += 1;
+            if calls == 3 {
+                let what = Ok(Answer::Masters(Vec::new()));
+                daemon.send(&Content::Answer(Numbered { id: 1, master: 0, what }).into()).expect("the client listens");
+            }
+        };
+        let answered = client.ask_meanwhile(0, Query::Masters, Vec::new(), (PAUSE, &mut meanwhile));
+        assert!(matches!(answered, Ok((Answer::Masters(_), _))), "{answered:?}");
+        assert_eq!(calls, 3);
     }
 
     // covers: daemon

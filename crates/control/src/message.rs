@@ -5,7 +5,7 @@
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
-pub use ringcat_engine::main_device::snapshot::{Activity, CableSnapshot, ClockSnapshot, Snapshot};
+pub use ringcat_engine::main_device::snapshot::{Activity, CableSnapshot, ClockSnapshot, RingSnapshot, Snapshot};
 use serde::{Deserialize, Serialize};
 
 pub use crate::information::SegmentOverview;
@@ -180,11 +180,6 @@ pub enum Query {
         /// First register.
         address: u16,
     },
-    /// Reads the whole SII.
-    SiiRead {
-        /// Position of the SubDevice.
-        position: u16,
-    },
     /// Requests a state: 1 INIT, 2 PREOP, 3 BOOT, 4 SAFEOP, 8 OP.
     RequestState {
         /// Position of the SubDevice.
@@ -235,7 +230,6 @@ impl Query {
             | Query::Events { .. }
             | Query::AlStatus { .. }
             | Query::SdoUpload { .. }
-            | Query::SiiRead { .. }
             | Query::Overview
             | Query::IdnRead { .. } => Right::Read,
             Query::RegisterRead { address, length, .. } => right_to_read(*address, *length),

@@ -8,13 +8,18 @@ mod lines;
 use serde::{Deserialize, Serialize};
 
 pub use lines::{
-    AreaLine, ClockFeatures, DeclaredLine, DeclaredSyncManager, Description, DomainLine, EntryLine, EthernetLine,
-    IdnLine, IpParameters, LinkReport, MasterReport, ObjectLine, PdoEntryLine, PdoLine, PortLine, PortsLine, SdoLine,
-    SubDeviceLine, SyncLine, SyncManagerLine, Traffic, TrafficRate,
+    AreaLine, ClockFeatures, CycleReport, DeclaredLine, DeclaredSyncManager, Description, DomainLine, EntryLine,
+    EthernetLine, IdnLine, IpParameters, LinkReport, MasterReport, ObjectLine, PdoEntryLine, PdoLine, PortLine,
+    PortsLine, SdoLine, SiiLine, SubDeviceLine, SyncLine, SyncManagerLine, Traffic, TrafficRate, TransferLine,
+    TransferWork,
 };
 
 /// Most SubDevices in one answer to [`ToolQuery::SubDevices`] and [`ToolQuery::Ports`].
 pub const MOST_SUBDEVICES: usize = 512;
+/// Most SubDevices in one [`ToolQuery::SiiImages`].
+pub const MOST_IMAGES: usize = 64;
+/// Most transfers in one answer to [`ToolQuery::Transfers`].
+pub const MOST_TRANSFERS: usize = 16;
 /// Most declared SubDevices in one answer to [`ToolQuery::Declared`].
 pub const MOST_DECLARED: usize = 64;
 /// Most bytes of a part of a file, in [`ToolQuery::FilePart`].
@@ -91,6 +96,16 @@ pub enum ToolQuery {
         /// Number of the transfer; a file without bytes needs none before.
         transfer: u64,
     },
+    /// Reads whole SIIs. One that has proved to be unchanged since it was read is not read again.
+    SiiImages {
+        /// Positions of the SubDevices, at most [`MOST_IMAGES`].
+        positions: Vec<u16>,
+    },
+    /// How far the long transfers of a SubDevice are. Needs no frame.
+    Transfers {
+        /// Its position.
+        position: u16,
+    },
     /// Writes the whole SII with the bytes of the message.
     SiiWrite {
         /// Position of the SubDevice.
@@ -161,9 +176,15 @@ impl ToolQuery {
         )
     }
 
-    /// Whether it may take minutes: flash memory is erased and written.
+    /// Whether it may take minutes: flash memory is erased and written, or read word by word.
     pub fn is_long(&self) -> bool {
-        matches!(self, ToolQuery::FileRead { .. } | ToolQuery::FileWrite { .. } | ToolQuery::SiiWrite { .. })
+        matches!(
+            self,
+            ToolQuery::FileRead { .. }
+                | ToolQuery::FileWrite { .. }
+                | ToolQuery::SiiImages { .. }
+                | ToolQuery::SiiWrite { .. }
+        )
     }
 }
 
@@ -189,6 +210,11 @@ pub enum ToolAnswer {
     Declared(Piece<DeclaredLine>),
     /// To [`ToolQuery::Domains`].
     Domains(Vec<DomainLine>),
+    /// To [`ToolQuery::SiiImages`], in the order of the positions. The bytes of the message are the images, one behind
+    /// the other.
+    SiiImages(Vec<SiiLine>),
+    /// To [`ToolQuery::Transfers`], the oldest first, at most [`MOST_TRANSFERS`].
+    Transfers(Vec<TransferLine>),
     /// To [`ToolQuery::Ethernet`].
     Ethernet(Vec<EthernetLine>),
 }

@@ -80,5 +80,6 @@ pub use queue::{Consumer, queue};
 pub use ring::identity::{Class, Classified, class_of};
 pub use ring::{FrameLimit, Identity, MAX_IN_FLIGHT, MIN_DATAGRAMS_PER_FRAME, RingState};
 pub use segment::ReadPdos;
+pub use supervisor::long_transfers::{TransferKind, TransferProgress};
 pub use supervisor::{AcyclicCounters, Bus, BusError, Reply, Supervisor, UnderWay};
 pub use topology::{Closing, PortOf, Topology};

@@ -78,6 +78,7 @@ use crate::procedures::scan::ScanError;
 use crate::procedures::serve_requests::Requests;
 use crate::procedures::shared_segment::SharedSegment;
 use crate::procedures::sii::SiiCache;
+use crate::procedures::sii::images::SiiImages;
 use crate::procedures::stop::{StopError, all_known, stop};
 use crate::procedures::undeclared::UndeclaredMailboxes;
 use crate::queue::Consumer;
@@ -104,6 +105,8 @@ pub struct MainDevice {
     activations: u32,
     identity: Identity,
     cache: SiiCache,
+    /// EEPROMs that were read whole.
+    sii_images: SiiImages,
     /// Why the last scan failed.
     scan_error: Rc<RefCell<Option<ScanError>>>,
     stopped: StopSlot,
@@ -155,6 +158,7 @@ impl MainDevice {
             counted: AcyclicCounters::default(),
             identity,
             cache,
+            sii_images: SiiImages::default(),
             scan_error: Rc::default(),
             stopped: StopSlot::default(),
             segment,

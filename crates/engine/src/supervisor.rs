@@ -13,6 +13,7 @@ mod executor;
 mod flight;
 mod flights;
 mod group;
+pub(crate) mod long_transfers;
 pub(crate) mod memory_writes;
 mod outbox;
 mod posted;

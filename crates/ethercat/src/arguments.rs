@@ -44,6 +44,8 @@ pub struct Arguments {
     pub sim: Option<String>,
     /// `--follow`.
     pub follow: bool,
+    /// `--once`.
+    pub once: bool,
     /// `--json`.
     pub json: bool,
 }
@@ -66,8 +68,8 @@ pub const OPTIONS: [(char, &str, bool); 12] = [
 
 /// Options of our own: name, and whether a value follows. An abbreviation means one of them only where it means none of
 /// [`OPTIONS`]: scripts for the original tool go on working.
-pub const OWN: [(&str, bool); 5] =
-    [("main", true), ("redundant", true), ("sim", true), ("follow", false), ("json", false)];
+pub const OWN: [(&str, bool); 6] =
+    [("main", true), ("redundant", true), ("sim", true), ("follow", false), ("once", false), ("json", false)];
 
 impl Arguments {
     /// Reads the words of a command line, the name of the program left out.
@@ -151,6 +153,7 @@ impl Arguments {
                     "verbose" => &mut self.verbose,
                     "emergency" => &mut self.emergency,
                     "follow" => &mut self.follow,
+                    "once" => &mut self.once,
                     "json" => &mut self.json,
                     _ => &mut self.help,
                 };

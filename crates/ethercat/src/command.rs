@@ -33,4 +33,6 @@ pub mod soe_write;
 pub mod states;
 pub mod upload;
 pub mod version;
+pub mod watch;
+mod watched;
 pub mod xml;

@@ -4,7 +4,7 @@ use crate::command;
 use crate::shape::Command;
 
 /// All commands by name.
-pub const ALL: [&Command; 31] = [
+pub const ALL: [&Command; 32] = [
     &command::alias::COMMAND,
     &command::clocks::COMMAND,
     &command::config::COMMAND,
@@ -35,12 +35,13 @@ pub const ALL: [&Command; 31] = [
     &command::states::COMMAND,
     &command::upload::COMMAND,
     &command::version::COMMAND,
+    &command::watch::COMMAND,
     &command::xml::COMMAND,
 ];
 
 /// Commands that the original tool does not have. An abbreviation means one of them only where it means none of the
 /// others: scripts go on working.
-pub const OWN: [&str; 3] = ["clocks", "events", "ring"];
+pub const OWN: [&str; 4] = ["clocks", "events", "ring", "watch"];
 
 /// What an abbreviation stands for.
 #[derive(Debug)]
@@ -109,7 +110,10 @@ mod tests {
         assert_eq!(names("siir"), ["sii_read", "sii_write"]);
         assert_eq!(names("dw"), ["download"]);
         assert!(names("xyz").is_empty());
-        assert_eq!([names("ev"), names("cl"), names("ring")].concat(), ["events", "clocks", "ring"]);
+        assert_eq!(
+            [names("ev"), names("cl"), names("ring"), names("wat")].concat(),
+            ["events", "clocks", "ring", "watch"]
+        );
         assert_eq!(names("r"), ["reg_read", "reg_write", "rescan"]);
         assert_eq!(names("c"), ["config", "crc", "cstruct"]);
         assert!(OWN.iter().all(|own| ALL.iter().any(|command| command.name == *own)));

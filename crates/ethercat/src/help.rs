@@ -67,7 +67,7 @@ pub fn of(command: &Command) -> String {
 pub fn json_of(command: &Command) -> &'static str {
     match command.output {
         Output::Data => JSON,
-        Output::Nothing => "",
+        Output::Table | Output::Nothing => "",
     }
 }
 

@@ -5,6 +5,7 @@
 //! * [`shape`]: the description of a command; [`commands`]: all commands, also by abbreviation; [`help`]: their use;
 //! * [`completion`], [`manual`]: scripts for shells and manual pages, from [`options_help`] and the same help;
 //! * [`standalone`]: a bus without a daemon, for one command;
+//! * [`progress`]: a bar while a command waits;
 //! * [`session`]: the daemon and its masters; [`selection`]: SubDevices by alias and position;
 //! * [`data_types`]: values of objects, registers and IDNs; [`aborts`]: codes of refusals;
 //! * `command`: one file per command; `json`: what they print with `--json`.
@@ -29,6 +30,8 @@ pub mod manual;
 pub mod numbers;
 pub mod options_help;
 mod order;
+pub mod progress;
+mod screen;
 pub mod selection;
 pub mod selection_help;
 pub mod session;
@@ -83,8 +86,13 @@ fn try_run(words: &[OsString], socket: &Path, output: &mut dyn Write, errors: &m
         output.write_all(help::of(command).as_bytes())?;
         return Ok(());
     }
-    if arguments.json && command.output == Output::Nothing {
-        let failure = Failure::usage(format!("'{}' prints no data: it has no --json!", command.name));
+    let without_json = match command.output {
+        Output::Data => None,
+        Output::Table => Some("is for people"),
+        Output::Nothing => Some("prints no data"),
+    };
+    if let (true, Some(why)) = (arguments.json, without_json) {
+        let failure = Failure::usage(format!("'{}' {why}: it has no --json!", command.name));
         return Err(failure.with_help(|| help::of(command)));
     }
     let links = standalone::links(&arguments).map_err(wrong)?;

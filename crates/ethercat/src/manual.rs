@@ -16,10 +16,13 @@ fn roff(text: &str) -> String {
     lines.collect::<Vec<String>>().join("\n")
 }
 
+/// When the pages were changed last.
+const DATE: &str = "2026-11-30";
+
 fn head(name: &str, summary: &str) -> String {
     let version = env!("CARGO_PKG_VERSION");
     let (title, summary) = (roff(&name.to_uppercase()), roff(summary.trim_end_matches('.')));
-    format!(".TH \"{title}\" 8 \"\" \"RingCAT {version}\"\n.SH NAME\n{} \\- {summary}\n", roff(name))
+    format!(".TH \"{title}\" 8 \"{DATE}\" \"RingCAT {version}\"\n.SH NAME\n{} \\- {summary}\n", roff(name))
 }
 
 fn options(title: &str, options: &[OptionHelp]) -> String {
@@ -47,9 +50,10 @@ const END: &str = ".SH EXIT STATUS\n0, or 1 after a failure.\n.SH ENVIRONMENT\n.
 /// The page of a command: `ethercat-slaves.8`.
 pub fn page(command: &Command) -> String {
     let mut text = head(&format!("ethercat-{}", command.name), command.summary) + ".SH SYNOPSIS\n";
-    for form in command.forms {
-        let _ = writeln!(text, ".B ethercat {}\n[OPTIONS] {}\n.br", roff(command.name), roff(form));
-    }
+    let form = |form: &&str| {
+        format!(".B ethercat {}\n{}\n", roff(command.name), roff(&format!("[OPTIONS] {form}")).trim_end())
+    };
+    text += &command.forms.iter().map(form).collect::<Vec<String>>().join(".br\n");
     if !command.help.is_empty() {
         text += ".SH DESCRIPTION\n";
         text += &as_it_is(command.help);

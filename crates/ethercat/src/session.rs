@@ -13,8 +13,9 @@ use crate::arguments::Arguments;
 use crate::failure::{Failure, unexpected};
 use crate::numbers::List;
 use crate::order;
+use crate::progress::{self, Bar, Transfer};
 use crate::selection::{self, Slave};
-use crate::standalone::Standalone;
+use crate::standalone::{Standalone, Started};
 
 /// A command at work.
 pub struct Session<'a> {
@@ -24,6 +25,8 @@ pub struct Session<'a> {
     pub arguments: Arguments,
     socket: &'a Path,
     client: Option<Client>,
+    /// Asks how far a transfer is.
+    looker: Option<Client>,
     /// Links of a bus without a daemon: no other bus is asked then.
     links: Option<String>,
     _standalone: Option<Standalone>,
@@ -45,7 +48,7 @@ impl<'a> Session<'a> {
         output: &'a mut dyn Write,
         errors: &'a mut dyn Write,
     ) -> Session<'a> {
-        Session { name, arguments, socket, client: None, links: None, _standalone: None, output, errors }
+        Session { name, arguments, socket, client: None, looker: None, links: None, _standalone: None, output, errors }
     }
 
     /// On these links instead, which a daemon of this command drives from the first question on.
@@ -119,8 +122,8 @@ impl<'a> Session<'a> {
         if self.client.is_none() {
             let client = match &self.links {
                 Some(links) => {
-                    let (standalone, client) = Standalone::start(links)?;
-                    self._standalone = Some(standalone);
+                    let Started { standalone, client, looker } = Standalone::start(links)?;
+                    (self._standalone, self.looker) = (Some(standalone), looker);
                     client
                 }
                 None => Client::connect(self.socket, "ethercat")?,
@@ -141,6 +144,24 @@ impl<'a> Session<'a> {
     /// The daemon refuses, or is not there.
     pub fn ask(&mut self, master: u32, ask: Query, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), Failure> {
         Ok(self.client()?.ask_patiently(master, &ask, &bytes)?)
+    }
+
+    /// As [`Session::ask`], for a transfer that may take seconds: a terminal at the standard error shows a bar.
+    ///
+    /// # Errors
+    /// As [`Session::ask`].
+    pub fn ask_with_bar(&mut self, of: Transfer, ask: Query, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), Failure> {
+        let is_wanted = !self.arguments.json && !self.arguments.quiet;
+        self.client()?;
+        let Session { name, socket, client: Some(client), looker, errors, .. } = self else { return Err(unexpected()) };
+        if !is_wanted || !progress::is_shown() {
+            return Ok(client.ask_patiently(of.master, &ask, &bytes)?);
+        }
+        let mut bar = Bar::new(name, of, socket, looker);
+        let mut draw = || bar.draw(errors);
+        let asked = client.ask_patiently_meanwhile(of.master, &ask, &bytes, (progress::INTERVAL, &mut draw));
+        bar.remove(errors);
+        Ok(asked?)
     }
 
     /// The whole state of a master.
@@ -288,14 +309,30 @@ impl<'a> Session<'a> {
     /// # Errors
     /// None or several are selected.
     pub fn single_slave(&mut self) -> Result<(u32, u16), Failure> {
-        let master = self.single_master()?;
-        match &self.slaves(master)?[..] {
-            [slave] => Ok((master, slave.line.position)),
-            selected => {
-                let text = format!("'{}' requires a single slave to be selected: {} are!", self.name, selected.len());
-                Err(Failure::usage(text))
-            }
+        let (master, selected) = self.selected()?;
+        match selected[..] {
+            [position] => Ok((master, position)),
+            _ => Err(self.wrong_number("a single slave", selected.len())),
         }
+    }
+
+    /// Master and positions of the SubDevices of a command that needs one or more.
+    ///
+    /// # Errors
+    /// None is selected.
+    pub fn some_slaves(&mut self) -> Result<(u32, Vec<u16>), Failure> {
+        let (master, selected) = self.selected()?;
+        if selected.is_empty() { Err(self.wrong_number("one slave or more", 0)) } else { Ok((master, selected)) }
+    }
+
+    fn selected(&mut self) -> Result<(u32, Vec<u16>), Failure> {
+        let master = self.single_master()?;
+        let slaves = self.slaves(master)?;
+        Ok((master, slaves.iter().map(|slave| slave.line.position).collect()))
+    }
+
+    fn wrong_number(&self, wanted: &str, selected: usize) -> Failure {
+        Failure::usage(format!("'{}' requires {wanted} to be selected: {selected} are!", self.name))
     }
 }
 

@@ -9,6 +9,8 @@ use crate::session::Session;
 pub enum Output {
     /// Data, which `--json` has too.
     Data,
+    /// What other commands print too, for people.
+    Table,
     /// Nothing: it changes something.
     Nothing,
 }

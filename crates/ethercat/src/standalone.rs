@@ -19,6 +19,7 @@ use ringcat_control::tool::{MasterReport, Piece, ToolAnswer, ToolQuery};
 
 use crate::arguments::Arguments;
 use crate::failure::{Failure, unexpected};
+use crate::progress;
 
 /// The daemon's program.
 const PROGRAM: &str = "ringcatd";
@@ -55,6 +56,17 @@ pub struct Standalone {
     standard_error: Option<JoinHandle<String>>,
 }
 
+/// A bus that a daemon of this command drives.
+#[derive(Debug)]
+pub struct Started {
+    /// The daemon.
+    pub standalone: Standalone,
+    /// The connection to it.
+    pub client: Client,
+    /// Another one, where bars are shown.
+    pub looker: Option<Client>,
+}
+
 /// The links that the options name, as the option of the daemon; `None` without such an option.
 ///
 /// # Errors
@@ -85,11 +97,11 @@ fn is_interface(name: &str) -> bool {
 
 impl Standalone {
     /// Starts the daemon on these links, and waits until the segment is known and its SubDevices are in PREOP or stay
-    /// where they are. The daemon, and the connection to it.
+    /// where they are.
     ///
     /// # Errors
     /// The daemon cannot be started, or cannot drive the bus.
-    pub fn start(links: &str) -> Result<(Standalone, Client), Failure> {
+    pub fn start(links: &str) -> Result<Started, Failure> {
         let begin = Instant::now();
         let directory = PrivateDirectory::new()?;
         let socket = directory.0.join("control");
@@ -107,11 +119,12 @@ impl Standalone {
         let standard_error = listen_to(daemon.stderr.take());
         let mut standalone = Standalone { daemon, standard_error };
         let mut client = standalone.connect(&socket, begin)?;
-        // The connection is enough: nothing is left where the command is ended by a signal.
+        let looker = progress::is_shown().then(|| Client::connect(&socket, "ethercat").ok()).flatten();
+        // The connections are enough: nothing is left where the command is ended by a signal.
         drop(directory);
         check(&mut client)?;
         settle(&mut client, begin)?;
-        Ok((standalone, client))
+        Ok(Started { standalone, client, looker })
     }
 
     /// Waits until the daemon answers.

@@ -13,6 +13,7 @@
 //! * [`tap`]: TAP interfaces, network interfaces whose other end is this process;
 //! * [`monotonic`], [`realtime`]: the host's clock, scheduling, memory locking, processor latency;
 //! * [`operator`]: lines on the standard error and in the journal, without waiting;
+//! * [`terminal`]: its size, and keys one by one;
 //! * [`visible`]: text for a terminal, with hidden characters as escape sequences;
 //! * [`signals`]: signals that request the end of a program;
 //! * [`pcapng`]: captures for Wireshark; [`recorder`]: writing captures during operation; [`sniffer`]: capturing an
@@ -49,6 +50,7 @@ pub mod sniffer;
 #[cfg(target_pointer_width = "64")]
 mod system_call;
 pub mod tap;
+pub mod terminal;
 pub mod visible;
 pub mod waiting;
 pub mod wake_up;

@@ -171,6 +171,12 @@ impl Observer {
         }
     }
 
+    /// Counts and delays of the cycles; zeros for an application that runs the parts of a cycle itself.
+    #[cfg(feature = "daemon")]
+    pub(crate) fn pace(&self) -> crate::pace::Pace {
+        self.0.cyclic_status.pace()
+    }
+
     /// Process data of all SubDevices as their FMMUs map it.
     pub fn fmmus(&self) -> &[DomainFmmu] {
         &self.0.fmmus

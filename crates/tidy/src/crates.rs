@@ -88,6 +88,7 @@ const RULES: &[CrateRule] = &[
             "ringcatd",
             "ringcat-control",
             "ringcat-engine",
+            "ringcat-link",
             "json-keys",
             "ringcat-wire",
         ]),

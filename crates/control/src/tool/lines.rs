@@ -4,6 +4,8 @@ use std::net::Ipv4Addr;
 
 use serde::{Deserialize, Serialize};
 
+use crate::refusal::Refusal;
+
 /// The master as a whole.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MasterReport {
@@ -23,6 +25,21 @@ pub struct MasterReport {
     pub reference_time_ns: u64,
     /// Time of the application, in nanoseconds since 2000-01-01; 0 if none is active.
     pub application_time_ns: u64,
+    /// Cycles of the application; `None` while none run.
+    pub cycles: Option<CycleReport>,
+}
+
+/// Cycles of an application.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CycleReport {
+    /// Number of the last one, from 0.
+    pub number: u64,
+    /// When it began, in nanoseconds of the application's host.
+    pub at_ns: u64,
+    /// Cycles that began late, that were left out, and after which a domain was incomplete.
+    pub late_skipped_incomplete: [u64; 3],
+    /// Longest delay of the beginning of a cycle; 0 for an application that runs the parts of a cycle itself.
+    pub longest_delay_ns: u64,
 }
 
 /// A link.
@@ -62,6 +79,43 @@ pub struct TrafficRate {
     pub lost_per_s: f64,
     /// Bytes lost per second.
     pub lost_bytes_per_s: f64,
+}
+
+/// An SII.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SiiLine {
+    /// Position of the SubDevice.
+    pub position: u16,
+    /// Bytes of its image; why it was not read.
+    pub bytes: Result<u32, Refusal>,
+}
+
+/// What a transfer does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum TransferWork {
+    /// Reads an SII.
+    SiiRead,
+    /// Writes an SII.
+    SiiWrite,
+    /// Reads a file.
+    FileRead,
+    /// Writes a file.
+    FileWrite,
+    /// Reads an object in segments.
+    ObjectRead,
+    /// Writes an object in segments.
+    ObjectWrite,
+}
+
+/// How far a transfer is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TransferLine {
+    /// What it does.
+    pub work: TransferWork,
+    /// Bytes that are done.
+    pub done: u64,
+    /// All its bytes; `None` if they are not known in advance.
+    pub total: Option<u64>,
 }
 
 /// A SubDevice in a list.

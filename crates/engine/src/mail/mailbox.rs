@@ -17,6 +17,7 @@ use super::unsolicited::{Unclaimed, Unsolicited};
 use crate::declared::Address;
 use crate::role::Function;
 use crate::supervisor::Bus;
+use crate::supervisor::long_transfers::{TransferKind, UnderWayTransfer};
 use crate::supervisor::memory_writes::UnderWayWrite;
 use crate::time::Instant;
 
@@ -108,6 +109,12 @@ impl Mailbox {
     /// Notes that a write into the memory of the SubDevice is under way, until what is returned is dropped.
     pub(super) fn begin_memory_write(&self, kind: WriteKind) -> UnderWayWrite {
         self.shared.bus.begin_memory_write(self.shared.subdevice.get().memory_write(kind))
+    }
+
+    /// Notes that a transfer is under way, until what is returned is dropped.
+    pub(super) fn begin_transfer(&self, kind: TransferKind, total: Option<u64>) -> UnderWayTransfer {
+        // No SubDevice has address 0: what a closed mailbox transfers is shown of none.
+        self.shared.bus.begin_transfer(self.station().unwrap_or(StationAddress(0)), kind, total)
     }
 
     /// Waits until a lane is free, and takes it.

@@ -31,11 +31,13 @@ use crate::procedures::services::ports::BlockedPort;
 use crate::procedures::services::registers::Urgency;
 use crate::procedures::services::statistics::{self, Statistics};
 use crate::procedures::services::{ServiceError, ports, registers, reset};
+use crate::procedures::sii::images::{self, SiiImages};
 use crate::procedures::sii::program::{self, SiiWritten};
 use crate::procedures::unassigned::rescan::{Rescan, rescan};
 use crate::role::Function;
 use crate::segment::{Addressed, Observation};
 use crate::supervisor::Bus;
+use crate::supervisor::long_transfers::TransferProgress;
 
 impl MainDevice {
     /// Station address of a SubDevice.
@@ -225,13 +227,36 @@ impl MainDevice {
         })
     }
 
-    /// Starts a read of a whole EEPROM; the SII contains its size.
+    /// Starts a read of a whole EEPROM, word by word; the SII contains its size.
     pub fn start_sii_read(&mut self, subdevice: impl Into<Address>) -> Pending<Result<Vec<u8>, ServiceError>> {
-        let eeproms = self.segment.eeproms.clone();
+        let (images, eeproms) = (self.images_of_present(), self.segment.eeproms.clone());
         self.start_on(Function::Eeprom, subdevice, move |bus, station| async move {
             let _turn = eeproms.take(station).await;
-            program::read_all(&bus, station).await
+            images::read_anew(&bus, station, &images).await
         })
+    }
+
+    /// As [`MainDevice::start_sii_read`], but an EEPROM that has proved to be unchanged since it was read whole is not
+    /// read again (decision 0210).
+    pub fn start_sii_image(&mut self, subdevice: impl Into<Address>) -> Pending<Result<Vec<u8>, ServiceError>> {
+        let (images, eeproms) = (self.images_of_present(), self.segment.eeproms.clone());
+        let cache = self.cache.clone();
+        self.start_on(Function::Eeprom, subdevice, move |bus, station| async move {
+            let _turn = eeproms.take(station).await;
+            images::read(&bus, station, &images, &cache).await
+        })
+    }
+
+    /// The images that were read, without those of SubDevices that have left.
+    fn images_of_present(&self) -> SiiImages {
+        let view = self.segment.view();
+        self.sii_images.keep_those(|station| view.subdevices().all().iter().any(|it| it.key.station == station));
+        self.sii_images.clone()
+    }
+
+    /// How far the long transfers of a SubDevice are: EEPROM, files, objects in segments.
+    pub fn transfers(&self, subdevice: impl Into<Address>) -> Vec<TransferProgress> {
+        self.station(subdevice).map(|station| self.bus().transfers(station)).unwrap_or_default()
     }
 
     /// Starts a write of an EEPROM: each word that differs is written and read back. Without `force` only an SII image
@@ -242,11 +267,12 @@ impl MainDevice {
         image: Vec<u8>,
         force: bool,
     ) -> Pending<Result<SiiWritten, ServiceError>> {
-        let (cache, eeproms) = (self.cache.clone(), self.segment.eeproms.clone());
+        let (cache, images, eeproms) = (self.cache.clone(), self.sii_images.clone(), self.segment.eeproms.clone());
         let subdevice: Address = subdevice.into();
         self.start_on(Function::Eeprom, subdevice, move |bus, station| async move {
             let _turn = eeproms.take(station).await;
             let _write = bus.begin_memory_write(subdevice.memory_write(WriteKind::Eeprom));
+            images.forget(station);
             let written = program::write(&bus, station, &image, force).await;
             cache.clear();
             written
@@ -261,11 +287,12 @@ impl MainDevice {
         alias: u16,
         force: bool,
     ) -> Pending<Result<SiiWritten, ServiceError>> {
-        let (cache, eeproms) = (self.cache.clone(), self.segment.eeproms.clone());
+        let (cache, images, eeproms) = (self.cache.clone(), self.sii_images.clone(), self.segment.eeproms.clone());
         let subdevice: Address = subdevice.into();
         self.start_on(Function::Eeprom, subdevice, move |bus, station| async move {
             let _turn = eeproms.take(station).await;
             let _write = bus.begin_memory_write(subdevice.memory_write(WriteKind::Eeprom));
+            images.forget(station);
             let written = program::write_alias(&bus, station, alias, force).await;
             cache.clear();
             written

@@ -8,6 +8,7 @@ mod contents;
 mod eeprom;
 mod error;
 mod extents;
+pub mod images;
 mod pace;
 pub mod program;
 mod shared_words;

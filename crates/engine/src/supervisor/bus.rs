@@ -20,6 +20,7 @@ use ringcat_wire::datagram::Target;
 use ringcat_wire::memory_write::MemoryWrite;
 
 use super::counters::AcyclicCounters;
+use super::long_transfers::{TransferKind, TransferProgress, UnderWayTransfer};
 use super::memory_writes::UnderWayWrite;
 use super::reply::{BusError, Reply};
 use super::shared_cell::SharedCell;
@@ -54,6 +55,21 @@ impl Bus {
     /// role is not given up.
     pub(crate) fn begin_memory_write(&self, write: MemoryWrite) -> UnderWayWrite {
         self.shared.borrow().memory_writes.begin(write)
+    }
+
+    /// Notes that a transfer of a SubDevice is under way, until what is returned is dropped.
+    pub(crate) fn begin_transfer(
+        &self,
+        station: StationAddress,
+        kind: TransferKind,
+        total: Option<u64>,
+    ) -> UnderWayTransfer {
+        self.shared.borrow().long_transfers.begin(station, kind, total)
+    }
+
+    /// How far the transfers of a SubDevice are.
+    pub(crate) fn transfers(&self, station: StationAddress) -> Vec<TransferProgress> {
+        self.shared.borrow().long_transfers.of(station)
     }
 
     /// The links the MainDevice has.

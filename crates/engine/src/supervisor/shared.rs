@@ -11,6 +11,7 @@ use super::command_reports::{CommandReports, WrongCommand};
 use super::counters::AcyclicCounters;
 use super::debug_message::DebugMessages;
 use super::flights::Flights;
+use super::long_transfers::LongTransfers;
 use super::memory_writes::MemoryWrites;
 use super::outbox::{Outbox, Rank};
 use super::posted::Watchers;
@@ -66,6 +67,7 @@ pub(crate) struct Shared {
     pub(crate) max_datagrams: usize,
     pub(crate) role: RoleControl,
     pub(crate) memory_writes: MemoryWrites,
+    pub(crate) long_transfers: LongTransfers,
     pub(crate) current: TaskId,
     pub(crate) spawned: VecDeque<Task>,
     ready: VecDeque<TaskId>,
@@ -112,6 +114,7 @@ impl Shared {
             max_datagrams: usize::MAX,
             role: RoleControl::default(),
             memory_writes: MemoryWrites::default(),
+            long_transfers: LongTransfers::default(),
             current: TaskId(0),
             spawned: VecDeque::new(),
             ready: VecDeque::new(),

@@ -1,12 +1,14 @@
 //! `download`: writes an object.
 
 use ringcat_control::message::Query;
+use ringcat_control::tool::TransferWork;
 
 use super::upload::{data_type, sdo_index, sdo_sub_index};
 use crate::aborts::of_sdo;
 use crate::data_types::{self, DataType};
 use crate::failure::Failure;
 use crate::inputs;
+use crate::progress::Transfer;
 use crate::session::Session;
 use crate::shape::{Command, Output};
 
@@ -39,7 +41,8 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     };
     let bytes = value_bytes(data_type, value)?;
     let ask = Query::SdoDownload { position, index, sub_index };
-    session.ask(master, ask, bytes).map_err(of_sdo)?;
+    let transfer = Transfer { master, position, work: TransferWork::ObjectWrite };
+    session.ask_with_bar(transfer, ask, bytes).map_err(of_sdo)?;
     Ok(())
 }
 

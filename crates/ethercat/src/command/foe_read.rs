@@ -2,13 +2,15 @@
 
 use std::fs;
 
-use ringcat_control::tool::ToolQuery;
+use ringcat_control::message::Query;
+use ringcat_control::tool::{ToolQuery, TransferWork};
 
 use crate::aborts::of_foe;
 use crate::failure::Failure;
 use crate::json;
 use crate::json::reads::File;
 use crate::json::values::Hex;
+use crate::progress::Transfer;
 use crate::session::Session;
 use crate::shape::{Command, Output};
 
@@ -33,8 +35,10 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let [name] = session.words() else { return Err(Failure::usage("'foe_read' takes one argument: the file!")) };
     let file = name.clone();
     let (master, position) = session.single_slave()?;
-    let asked = session.done(master, ToolQuery::FileRead { position, name: file.clone() }, Vec::new());
-    let bytes = asked.map_err(|failure| of_foe(failure, "read"))?;
+    let transfer = Transfer { master, position, work: TransferWork::FileRead };
+    let ask = Query::Tool(ToolQuery::FileRead { position, name: file.clone() });
+    let asked = session.ask_with_bar(transfer, ask, Vec::new());
+    let (_, bytes) = asked.map_err(|failure| of_foe(failure, "read"))?;
     session.say_if_verbose(&format!("Read {} bytes of FoE data.", bytes.len()));
     let local = session.arguments.output_file.clone().filter(|file| file != "-");
     if let Some(local) = &local {

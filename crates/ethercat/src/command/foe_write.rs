@@ -4,11 +4,13 @@ use std::collections::hash_map::RandomState;
 use std::hash::BuildHasher;
 use std::path::Path;
 
-use ringcat_control::tool::{MOST_FILE, MOST_PART, ToolQuery};
+use ringcat_control::message::Query;
+use ringcat_control::tool::{MOST_FILE, MOST_PART, ToolQuery, TransferWork};
 
 use crate::aborts::of_foe;
 use crate::failure::Failure;
 use crate::inputs;
+use crate::progress::Transfer;
 use crate::session::Session;
 use crate::shape::{Command, Output};
 
@@ -48,7 +50,9 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         session.done(master, ToolQuery::FilePart { transfer, offset }, part.to_vec())?;
         offset += part.len() as u32;
     }
-    let asked = session.done(master, ToolQuery::FileWrite { position, name, transfer }, Vec::new());
+    let of = Transfer { master, position, work: TransferWork::FileWrite };
+    let ask = Query::Tool(ToolQuery::FileWrite { position, name, transfer });
+    let asked = session.ask_with_bar(of, ask, Vec::new());
     asked.map_err(|failure| of_foe(failure, "write"))?;
     session.say_if_verbose("FoE writing finished.");
     Ok(())

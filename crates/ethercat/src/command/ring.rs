@@ -1,6 +1,6 @@
 //! `ring`: the ring, its links and its cables. Not a command of the original tool.
 
-use ringcat_control::message::{Answer, CableSnapshot, Query, Snapshot};
+use ringcat_control::message::{Answer, CableSnapshot, Query, RingSnapshot, Snapshot};
 use ringcat_control::tool::{ToolAnswer, ToolQuery};
 
 use crate::failure::{Failure, unexpected};
@@ -24,7 +24,7 @@ Not a command of IgH.
 };
 
 /// The names of the links.
-const LINKS: [&str; 2] = ["MAIN", "REDUNDANT"];
+pub(super) const LINKS: [&str; 2] = ["MAIN", "REDUNDANT"];
 
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let masters = session.masters()?;
@@ -48,15 +48,20 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     Ok(())
 }
 
-fn text(state: &Snapshot, counts: [u16; 2], links: usize) -> String {
-    let ring = &state.ring;
-    let shown = match (ring.closed, ring.redundant) {
+/// The state of the ring in words.
+pub(super) fn state_of(ring: &RingSnapshot, links: usize) -> &'static str {
+    match (ring.closed, ring.redundant) {
         _ if links < LINKS.len() => "one link",
         (Some(true), Some(false)) => "closed, frames are lost in one direction",
         (Some(true), _) => "closed",
         (Some(false), _) => "OPEN: the next break isolates slaves",
         (None, _) => "unknown",
-    };
+    }
+}
+
+fn text(state: &Snapshot, counts: [u16; 2], links: usize) -> String {
+    let ring = &state.ring;
+    let shown = state_of(ring, links);
     let mut text = format!("ring        {shown}\n");
     for ((name, link), count) in LINKS.iter().zip(&ring.links).zip(counts).take(links) {
         let carrier = if link.carrier == Some(false) { ", no carrier" } else { "" };
@@ -77,7 +82,7 @@ fn text(state: &Snapshot, counts: [u16; 2], links: usize) -> String {
 }
 
 /// A cable by its two ends.
-fn cable(cable: &CableSnapshot) -> String {
+pub(super) fn cable(cable: &CableSnapshot) -> String {
     let end = |port: Option<(usize, u8)>, host: &str| match port {
         Some((position, port)) => format!("slave {position} port {port}"),
         None => format!("the {host} interface"),

@@ -1,9 +1,11 @@
 //! `sii_write`: writes an SII.
 
-use ringcat_control::tool::ToolQuery;
+use ringcat_control::message::Query;
+use ringcat_control::tool::{ToolQuery, TransferWork};
 
 use crate::failure::Failure;
 use crate::inputs;
+use crate::progress::Transfer;
 use crate::session::Session;
 use crate::shape::{Command, Output};
 use crate::sii_image::{FEWEST_WORDS, HEAD_WORDS, categories, wrong_checksum};
@@ -37,7 +39,8 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         check(&image)?;
     }
     let (master, position) = session.single_slave()?;
-    session.done(master, ToolQuery::SiiWrite { position, force }, image)?;
+    let transfer = Transfer { master, position, work: TransferWork::SiiWrite };
+    session.ask_with_bar(transfer, Query::Tool(ToolQuery::SiiWrite { position, force }), image)?;
     session.say_if_verbose("SII writing finished.");
     Ok(())
 }

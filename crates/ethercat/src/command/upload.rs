@@ -1,7 +1,7 @@
 //! `upload`: reads an object.
 
 use ringcat_control::message::Query;
-use ringcat_control::tool::{ToolAnswer, ToolQuery};
+use ringcat_control::tool::{ToolAnswer, ToolQuery, TransferWork};
 
 use crate::aborts::of_sdo;
 use crate::data_types::{self, DataType};
@@ -9,6 +9,7 @@ use crate::failure::Failure;
 use crate::json;
 use crate::json::reads::{Upload, Value};
 use crate::numbers;
+use crate::progress::Transfer;
 use crate::session::Session;
 use crate::shape::{Command, Output};
 
@@ -69,7 +70,8 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         None => data_type(session, master, (position, index, sub_index))?,
     };
     let ask = Query::SdoUpload { position, index, sub_index: Some(sub_index) };
-    let (_, value) = session.ask(master, ask, Vec::new()).map_err(of_sdo)?;
+    let transfer = Transfer { master, position, work: TransferWork::ObjectRead };
+    let (_, value) = session.ask_with_bar(transfer, ask, Vec::new()).map_err(of_sdo)?;
     if session.arguments.json {
         let Value { data_type, value, data } = Value::new(Some(data_type), &value)?;
         return json::print(session, &Upload { master, position, index, subindex: sub_index, data_type, value, data });

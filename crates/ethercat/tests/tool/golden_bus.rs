@@ -128,17 +128,27 @@ fn digital_output(is_whole: bool) -> Vec<u8> {
 /// The segment file, with the SIIs in a directory. With SoE the digital output has one PDO, as the application of the
 /// original had declared it: ours declares PDOs of SubDevices without a dictionary as they are.
 pub fn segment(directory: &Path, protocols: u16) -> Segment {
+    on(directory, protocols, false, "")
+}
+
+/// The same SubDevices in a ring, and a fifth one with EoE.
+pub fn ring(directory: &Path, protocols: u16) -> Segment {
+    on(directory, protocols, true, "[[device]]\ntype = \"ethernet-terminal\"\n")
+}
+
+fn on(directory: &Path, protocols: u16, is_ring: bool, more: &str) -> Segment {
     let files = [
         ("coupler.bin", coupler(), 64),
         ("input.bin", analogue_input(protocols), 32),
         ("output.bin", digital_output(protocols == COE_FOE), 0),
         ("silent.bin", image(header(0, [0x29C, 0x02C3_0001, 0, 0]), |_| ()), 0),
     ];
-    let mut text = "[segment]\nring = false\n".to_owned();
+    let mut text = format!("[segment]\nring = {is_ring}\n");
     for (name, bytes, clock_bits) in files {
         std::fs::write(directory.join(name), bytes).expect("it can be written");
         text += &format!("[[device]]\nsii = \"{name}\"\nclock_bits = {clock_bits}\n");
     }
+    text += more;
     let mut segment = Segment::from_toml(&text, directory).expect("it is right");
     let input = &mut segment.devices[1];
     input.objects.extend(objects());

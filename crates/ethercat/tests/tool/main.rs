@@ -16,4 +16,7 @@ mod outputs;
 mod ring_and_clocks;
 mod several;
 mod shells;
+mod siis;
+mod situations;
 mod standalone;
+mod terminal;

@@ -96,6 +96,7 @@ fn is_quick(ask: &Query) -> bool {
                     | ToolQuery::SubDevices { .. }
                     | ToolQuery::Description { .. }
                     | ToolQuery::Ports { .. }
+                    | ToolQuery::Transfers { .. }
             )
     )
 }

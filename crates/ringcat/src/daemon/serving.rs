@@ -64,7 +64,6 @@ pub fn answer(supervisor: &SupervisorThread, ask: Query, bytes: Vec<u8>) -> Resu
             registers(bytes.len())?;
             subdevice(position).register_write(RegisterAddress(address), bytes).map(done)
         }
-        Query::SiiRead { position } => subdevice(position).sii_read().map(data),
         Query::RequestState { position, state } => {
             let state = AlState::from_code(state).ok_or_else(|| expected("a state: 1, 2, 3, 4 or 8"))?;
             subdevice(position).request_state(state).map(done)

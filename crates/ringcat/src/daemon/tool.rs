@@ -7,6 +7,7 @@ mod dictionary;
 mod files;
 mod master;
 mod service;
+mod siis;
 mod subdevices;
 
 use ringcat_control::message::Answer;
@@ -55,6 +56,8 @@ pub(super) fn answer(supervisor: &SupervisorThread, ask: ToolQuery, bytes: Vec<u
         ToolQuery::Entry { position, index, sub_index } => {
             at(position).sdo_entry(index, sub_index).map(|entry| ToolAnswer::Entry(dictionary::line(entry)))
         }
+        ToolQuery::Transfers { position } => siis::transfers(supervisor, position).map(ToolAnswer::Transfers),
+        ToolQuery::SiiImages { positions } => return siis::images(supervisor, &positions),
         ToolQuery::Declared { from } => application::declared(supervisor, from).map(ToolAnswer::Declared),
         ToolQuery::Domains => return application::domains(supervisor),
         ToolQuery::Ethernet => master::ethernet(supervisor).map(ToolAnswer::Ethernet),

@@ -123,6 +123,12 @@ impl<S: Services> SubDevice<S> {
         self.ask(move |engine, subdevice| engine.start_sii_read(subdevice).ended())
     }
 
+    /// Its EEPROM as it was read whole before. One that has not proved to be unchanged since is read again; the proof
+    /// is a number that only this read has left in the registers of its EEPROM interface, and the first words.
+    pub fn sii_image(self) -> S::Outcome<Vec<u8>, SubDeviceError> {
+        self.ask(move |engine, subdevice| engine.start_sii_image(subdevice).ended())
+    }
+
     /// Writes its EEPROM: each word that differs is written and read back. Without `force` only an SII image is
     /// accepted. The SubDevice uses it after its next start.
     pub fn sii_write(self, image: Vec<u8>, force: bool) -> S::Outcome<SiiWritten, SubDeviceError> {

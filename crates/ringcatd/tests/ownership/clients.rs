@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use ringcat::daemon::{Answer, Client, ClientError, Query, Right};
 use ringcat::{Activity, AlState};
 use ringcat_control::Refusal;
+use ringcat_control::tool::{ToolAnswer, ToolQuery};
 
 use crate::bench::{Bench, ask, check_bar, copy_program};
 use crate::owner_process::{OwnerProcess, Work};
@@ -26,9 +27,10 @@ fn read_all(client: &mut Client, al_state: u16) -> Vec<Vec<u8>> {
     assert!(next > 0 && !events.is_empty() && events.iter().all(|event| !event.text.is_empty()));
     assert_eq!(ask(client, Query::AlStatus { position: DRIVE }), Answer::AlStatus { status: al_state, code: 0 });
     let registers = Query::RegisterRead { position: DRIVE, address: 0x0130, length: 2 };
-    let reads = [VENDOR, registers, Query::SiiRead { position: 0 }];
-    let data = reads.map(|what| client.ask(0, what, Vec::new()).expect("it is read"));
-    assert!(data.iter().all(|(answer, bytes)| *answer == Answer::Data && !bytes.is_empty()));
+    let images = Query::Tool(ToolQuery::SiiImages { positions: vec![0] });
+    let data = [VENDOR, registers, images].map(|what| client.ask(0, what, Vec::new()).expect("it is read"));
+    assert!(data[..2].iter().all(|(answer, bytes)| *answer == Answer::Data && !bytes.is_empty()));
+    assert!(matches!(&data[2].0, Answer::Tool(ToolAnswer::SiiImages(_))) && data[2].1.len() >= 128);
     assert_eq!(data[1].1, [al_state as u8, 0]);
     data.into_iter().map(|(_, bytes)| bytes).collect()
 }

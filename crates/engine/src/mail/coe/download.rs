@@ -11,6 +11,7 @@ use super::error::{SdoError, SdoFailure};
 use super::transfer::Transfer;
 use crate::mail::stream::{Bytes, Source};
 use crate::mail::{Limits, Mailbox};
+use crate::supervisor::long_transfers::TransferKind;
 
 /// Writes an object.
 pub async fn write(mailbox: &Mailbox, object: SdoAddress, data: &[u8], limits: Limits) -> Result<(), SdoError> {
@@ -45,12 +46,15 @@ pub async fn download(
     };
     transfer.exchange(&request, done).await?;
     let mut sent = data.len() as u64;
+    let more = (sent < u64::from(total)).then_some(total.into());
+    let under_way = more.map(|total| mailbox.begin_transfer(TransferKind::ObjectWrite, Some(total)));
     let mut toggle = false;
     while sent < u64::from(total) {
         data.resize(capacity.saturating_sub(SEGMENT_OVERHEAD).max(1).min(left(sent)), 0);
         fill(&mut transfer, source, &mut data, sent, total)?;
         sent += data.len() as u64;
         segment(&mut transfer, toggle, sent == u64::from(total), &data).await?;
+        under_way.iter().for_each(|it| it.done(sent));
         toggle = !toggle;
     }
     transfer.done();

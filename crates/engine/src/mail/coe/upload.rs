@@ -9,6 +9,7 @@ use super::error::{SdoError, SdoFailure};
 use super::transfer::Transfer;
 use crate::mail::stream::{Bounded, Overflow, Sink};
 use crate::mail::{Limits, Mailbox};
+use crate::supervisor::long_transfers::TransferKind;
 
 /// Reads an object of at most `limit` bytes.
 pub async fn read(mailbox: &Mailbox, object: SdoAddress, limits: Limits, limit: usize) -> Result<Vec<u8>, SdoError> {
@@ -50,10 +51,12 @@ pub async fn upload(
     }
     taken(&mut transfer, sink.begin(Some(total)))?;
     taken(&mut transfer, sink.take(&data))?;
+    let under_way = (got < total).then(|| mailbox.begin_transfer(TransferKind::ObjectRead, Some(total)));
     let mut toggle = false;
     while got < total {
         let (data, last) = segment(&mut transfer, toggle).await?;
         got += data.len() as u64;
+        under_way.iter().for_each(|it| it.done(got));
         if got > total || (last && got < total) {
             if last {
                 transfer.done();

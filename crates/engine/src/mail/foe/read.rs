@@ -9,6 +9,7 @@ use super::error::{FoeError, FoeFailure};
 use super::{FoeOptions, FoeProgress, Transfer};
 use crate::mail::Mailbox;
 use crate::mail::stream::Sink;
+use crate::supervisor::long_transfers::TransferKind;
 
 /// Reads a file; returns its length in bytes. `progress` is called after each packet.
 pub async fn read(
@@ -34,6 +35,7 @@ async fn run(
     if full == 0 {
         return Err(FoeFailure::SmallMailbox);
     }
+    let under_way = mailbox.begin_transfer(TransferKind::FileRead, None);
     let mut packet: u32 = 1;
     let mut bytes = 0;
     let request = FoeMessage::Read { password: options.password, name: file.as_bytes() };
@@ -46,6 +48,7 @@ async fn run(
             return Err(FoeFailure::TooLong(overflow));
         }
         bytes += data.len() as u64;
+        under_way.done(bytes);
         (transfer.progress)(FoeProgress::Bytes(bytes));
         let acknowledge = FoeMessage::Acknowledge { packet };
         if data.len() < full {

@@ -10,6 +10,7 @@ use super::error::{FoeError, FoeFailure};
 use super::{FoeOptions, FoeProgress, Transfer};
 use crate::mail::Mailbox;
 use crate::mail::stream::Source;
+use crate::supervisor::long_transfers::TransferKind;
 
 /// Writes a file; returns its length in bytes. `progress` is called after each packet.
 pub async fn write(
@@ -38,6 +39,7 @@ async fn run(
     }
     let request = FoeMessage::Write { password: options.password, name: file.as_bytes() };
     transfer.request(&request, acknowledged(0)).await?;
+    let under_way = mailbox.begin_transfer(TransferKind::FileWrite, source.total());
     let mut data = vec![0; full];
     let (mut packet, mut bytes) = (0u32, 0);
     loop {
@@ -45,6 +47,7 @@ async fn run(
         packet = packet.wrapping_add(1);
         transfer.request(&FoeMessage::Data { packet, data: &data[..count] }, acknowledged(packet)).await?;
         bytes += count as u64;
+        under_way.done(bytes);
         (transfer.progress)(FoeProgress::Bytes(bytes));
         // A packet with less data than fits ends the file; it is empty if the length is a multiple of a full packet.
         if count < full {

@@ -75,20 +75,25 @@ impl Eeprom {
             let begin = *begin.get_or_insert(bus.now());
             let elapsed = bus.now().since(begin);
             if !control.busy {
-                return Ok(Eeprom {
-                    bus: bus.clone(),
-                    station,
-                    pace,
-                    eight_bytes: control.eight_byte_reads,
-                    given: None,
-                    until: begin + LIMIT,
-                    words: Vec::new(),
-                });
+                return Ok(Eeprom { until: begin + LIMIT, ..Eeprom::ready(bus, station, pace, control) });
             }
             if elapsed >= LOAD_LIMIT {
                 return Err(SiiReadError::Busy { word: 0 });
             }
             bus.sleep(Pace::next(elapsed)).await;
+        }
+    }
+
+    /// That of a controller that is not busy, by its register SII_CONTROL.
+    pub(super) fn ready(bus: &Bus, station: StationAddress, pace: Pace, control: SiiControl) -> Eeprom {
+        Eeprom {
+            bus: bus.clone(),
+            station,
+            pace,
+            eight_bytes: control.eight_byte_reads,
+            given: None,
+            until: bus.now() + LIMIT,
+            words: Vec::new(),
         }
     }
 

@@ -17,6 +17,7 @@ use ringcat_wire::sii::{CHECKSUM_DISABLED, Sii, SiiError, checksum};
 use super::eeprom::Eeprom;
 use super::pace::Pace;
 use super::{MAX_WORDS, SiiReadError, claim};
+use crate::supervisor::long_transfers::{TransferKind, UnderWayTransfer};
 use crate::supervisor::{Bus, BusError};
 
 /// How long an EEPROM may take for a word.
@@ -197,18 +198,6 @@ pub fn check(image: &[u8], force: bool) -> Result<(), SiiProgramError> {
     if sii.end_marker { Ok(()) } else { Err(SiiProgramError::EndMarker) }
 }
 
-/// Reads the whole EEPROM of one SubDevice; the SII contains its size.
-pub async fn read_all(bus: &Bus, station: StationAddress) -> Result<Vec<u8>, SiiProgramError> {
-    let access = Access::begin(bus, station).await?;
-    let work = async {
-        let words = access.size().await?;
-        access.read(0, words.min(MAX_WORDS)).await
-    };
-    let bytes = work.await;
-    access.end().await?;
-    bytes
-}
-
 /// Writes an image; see [`check`]. One that is longer than the EEPROM states as its size needs `force`: what fits would
 /// be written, and the rest would fail.
 pub async fn write(
@@ -219,13 +208,14 @@ pub async fn write(
 ) -> Result<SiiWritten, SiiProgramError> {
     check(image, force)?;
     let words: Vec<u16> = image.as_chunks::<2>().0.iter().map(|pair| u16::from_le_bytes(*pair)).collect();
+    let under_way = bus.begin_transfer(station, TransferKind::EepromWrite, Some(image.len() as u64));
     let access = Access::begin(bus, station).await?;
     let work = async {
         let there = if force { words.len() } else { access.size().await? as usize };
         if words.len() > there {
             return Err(SiiProgramError::TooLong { words: words.len(), there });
         }
-        access.write_words(&words).await
+        access.write_words(&words, &under_way).await
     };
     let written = work.await;
     access.end().await?;
@@ -240,6 +230,7 @@ pub async fn write_alias(
     alias: u16,
     force: bool,
 ) -> Result<SiiWritten, SiiProgramError> {
+    let under_way = bus.begin_transfer(station, TransferKind::EepromWrite, None);
     let access = Access::begin(bus, station).await?;
     let work = async {
         let bytes = access.read(0, CONFIGURATION.len() as u32).await?;
@@ -253,7 +244,7 @@ pub async fn write_alias(
         if !disabled {
             words[CHECKSUM_WORD] = checksum_of(&words).into();
         }
-        access.write_words(&words).await
+        access.write_words(&words, &under_way).await
     };
     let written = work.await;
     access.end().await?;
@@ -277,7 +268,7 @@ fn checksum_of(words: &[u16]) -> u8 {
 }
 
 /// The EEPROM while it is assigned to EtherCAT.
-struct Access<'a> {
+pub(super) struct Access<'a> {
     bus: &'a Bus,
     station: StationAddress,
     /// It was assigned to the PDI before.
@@ -285,31 +276,31 @@ struct Access<'a> {
 }
 
 impl<'a> Access<'a> {
-    async fn begin(bus: &'a Bus, station: StationAddress) -> Result<Access<'a>, BusError> {
+    pub(super) async fn begin(bus: &'a Bus, station: StationAddress) -> Result<Access<'a>, BusError> {
         let before = SiiConfiguration::from_bits(bus.fprd_array::<1>(station, map::SII_CONFIGURATION).await?[0]);
         claim(bus, station).await?;
         Ok(Access { bus, station, offered: before.offer_pdi })
     }
 
-    async fn end(self) -> Result<(), BusError> {
+    pub(super) async fn end(self) -> Result<(), BusError> {
         if self.offered {
             self.bus.fpwr(self.station, map::SII_CONFIGURATION, &[1]).await?;
         }
         Ok(())
     }
 
-    async fn read(&self, first: u32, count: u32) -> Result<Vec<u8>, SiiProgramError> {
+    pub(super) async fn read(&self, first: u32, count: u32) -> Result<Vec<u8>, SiiProgramError> {
         let mut eeprom = Eeprom::open(self.bus, self.station, Pace::default()).await?;
         Ok(eeprom.bytes(first, count, None).await?)
     }
 
     /// Words of the EEPROM, as its present content states.
-    async fn size(&self) -> Result<u32, SiiProgramError> {
+    pub(super) async fn size(&self) -> Result<u32, SiiProgramError> {
         let size = self.read(SIZE_WORD, 1).await?;
         Ok((u32::from(u16::from_le_bytes([size[0], size[1]])) + 1) * KIBIT)
     }
 
-    async fn write_words(&self, words: &[u16]) -> Result<SiiWritten, SiiProgramError> {
+    async fn write_words(&self, words: &[u16], under_way: &UnderWayTransfer) -> Result<SiiWritten, SiiProgramError> {
         let mut done = SiiWritten::default();
         let area = CONFIGURATION.end.min(words.len());
         for at in (area..words.len()).chain(0..area) {
@@ -320,6 +311,7 @@ impl<'a> Access<'a> {
                 self.write_word(word, value).await?;
                 done.written += 1;
             }
+            under_way.done(2 * (done.written + done.unchanged) as u64);
         }
         Ok(done)
     }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat_control::tool::{EthernetLine, LinkReport, MasterReport, Traffic, TrafficRate};
+use ringcat_control::tool::{CycleReport, EthernetLine, LinkReport, MasterReport, Traffic, TrafficRate};
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::snapshot::Activity;
 use ringcat_engine::main_device::{MainDevice as Engine, MainDevicePhase};
@@ -20,10 +20,18 @@ pub(super) fn report(supervisor: &SupervisorThread) -> Result<MasterReport, Erro
     for (link, line) in Link::ALL.into_iter().zip(&mut report.links) {
         line.traffic = traffic(&supervisor.link_figures(link));
     }
-    let snapshot = supervisor.observer().and_then(|observer| observer.snapshot(CYCLE).ok());
-    if let Some(snapshot) = snapshot {
+    let observer = supervisor.observer();
+    let snapshot = observer.as_ref().and_then(|observer| observer.snapshot(CYCLE).ok());
+    if let (Some(snapshot), Some(observer)) = (snapshot, observer) {
         report.reference_time_ns = snapshot.reference_time.unwrap_or(0);
         report.application_time_ns = snapshot.application_time;
+        let pace = observer.pace();
+        report.cycles = Some(CycleReport {
+            number: snapshot.cycle,
+            at_ns: snapshot.taken_at.0,
+            late_skipped_incomplete: [pace.late, pace.skipped, snapshot.counters.incomplete],
+            longest_delay_ns: pace.longest_delay.as_nanos() as u64,
+        });
     }
     Ok(report)
 }

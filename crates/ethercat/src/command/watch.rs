@@ -1,0 +1,133 @@
+//! `watch`: a live table of states, working counters, ring, clocks and cycles. Not a command of the original tool.
+
+use std::io::{self, IsTerminal};
+use std::time::{Duration, Instant};
+
+use ringcat_control::client::ClientError;
+use ringcat_control::message::{Answer, MasterState, Query};
+use ringcat_control::tool::{CycleReport, ToolAnswer, ToolQuery};
+use ringcat_link::HeldSignals;
+use ringcat_link::terminal::{CTRL_C, CTRL_D, Key, Keys};
+
+use super::watched::{Watched, lines};
+use crate::failure::{Failure, unexpected};
+use crate::screen;
+use crate::session::Session;
+use crate::shape::{Command, Output};
+
+/// Interval of questions.
+const REFRESH: Duration = Duration::from_millis(500);
+/// Interval at which keys, signals and the size of the terminal are seen.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// The command.
+pub const COMMAND: Command = Command {
+    name: "watch",
+    summary: "Show a live table: states, counters, ring, clocks, cycles.",
+    forms: &[""],
+    help: "For each master the application that drives it, its ring, frames and lost
+frames per second, beside an application its cycles, the working counters of
+its domains and its clocks; then a line for each slave, with the difference
+from the reference clock where it has one.
+
+In a terminal the table is drawn twice a second at the same place, until q,
+Ctrl-C or the end of the input. Elsewhere, and with --once, it is printed
+once. Not a command of IgH.
+",
+    options: "  --once                 Print the table once.
+",
+    output: Output::Table,
+    run,
+};
+
+/// Cycles of a master when they were asked for last.
+#[derive(Clone, Copy)]
+struct Before {
+    master: u32,
+    cycles: CycleReport,
+}
+
+fn run(session: &mut Session<'_>) -> Result<(), Failure> {
+    let mut before = Vec::new();
+    if session.arguments.once || !io::stdout().is_terminal() {
+        let lines = table(session, &mut before)?;
+        return session.write_text(&lines.concat());
+    }
+    // A mistake is said on the screen that stays.
+    let first = table(session, &mut before)?;
+    let signals = HeldSignals::hold();
+    let mut keys = Keys::start()?;
+    session.write(screen::BEGIN.as_bytes())?;
+    let watched = draw(session, &mut before, first, (&signals, &mut keys));
+    let left = session.write(screen::END.as_bytes()).and_then(|()| session.flush());
+    watched.and(left)
+}
+
+/// Draws the table until the user has seen enough.
+fn draw(
+    session: &mut Session<'_>,
+    before: &mut Vec<Before>,
+    mut table_now: Vec<String>,
+    (signals, keys): (&HeldSignals, &mut Keys),
+) -> Result<(), Failure> {
+    let (mut drawn, mut asked) = (None, Instant::now());
+    loop {
+        let size = screen::size();
+        if asked.elapsed() >= REFRESH {
+            asked = Instant::now();
+            (table_now, drawn) = (table(session, before)?, None);
+        }
+        if drawn != Some(size) {
+            drawn = Some(size);
+            session.write(screen::page(&table_now, size).as_bytes())?;
+            session.flush()?;
+        }
+        let is_over = match keys.next(LOOK) {
+            Some(Key::Byte(byte)) => matches!(byte, b'q' | b'Q' | CTRL_C | CTRL_D),
+            Some(Key::End) => true,
+            None => false,
+        };
+        if is_over || signals.wait(Duration::ZERO).is_some() {
+            return Ok(());
+        }
+    }
+}
+
+/// The lines of all masters.
+fn table(session: &mut Session<'_>, before: &mut Vec<Before>) -> Result<Vec<String>, Failure> {
+    let mut all = Vec::new();
+    for master in session.masters()? {
+        if !all.is_empty() {
+            all.push("\n".to_owned());
+        }
+        match look(session, &master) {
+            Ok(watched) => {
+                let number = master.master;
+                let cycles = watched.report.cycles;
+                let last = before.iter().find(|it| it.master == number).map(|it| it.cycles);
+                before.retain(|it| it.master != number);
+                before.extend(cycles.map(|cycles| Before { master: number, cycles }));
+                all.extend(lines(&master, &watched, last));
+            }
+            // The others are shown all the same.
+            Err(Failure::Asked(ClientError::Refused(refusal))) => {
+                all.push(format!("Master{}  not shown: {refusal}\n", master.master));
+            }
+            Err(failure) => return Err(failure),
+        }
+    }
+    Ok(all)
+}
+
+/// All that is shown of a master.
+fn look(session: &mut Session<'_>, master: &MasterState) -> Result<Watched, Failure> {
+    let number = master.master;
+    let ToolAnswer::Master(report) = session.tool(number, ToolQuery::Master)? else { return Err(unexpected()) };
+    let state = session.state(number)?;
+    let (Answer::Overview(seen), _) = session.ask(number, Query::Overview, Vec::new())? else {
+        return Err(unexpected());
+    };
+    let ToolAnswer::Domains(domains) = session.tool(number, ToolQuery::Domains)? else { return Err(unexpected()) };
+    let slaves = session.slaves(number)?;
+    Ok(Watched { report, state, counts: seen.counts, domains, slaves })
+}

@@ -1,0 +1,106 @@
+//! The terminal of a program: its size, and its keys one by one.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::mem::zeroed;
+use std::os::fd::{AsFd, AsRawFd, BorrowedFd};
+use std::time::Duration;
+
+use crate::process::wait_readable;
+
+/// Columns and rows of a terminal; `None` for anything else, and for a terminal that does not know them.
+pub fn size(terminal: BorrowedFd<'_>) -> Option<(u16, u16)> {
+    // SAFETY: all bytes zero is a valid size, and the pointer is to a live one.
+    let (answered, size) = unsafe {
+        let mut size: libc::winsize = zeroed();
+        (libc::ioctl(terminal.as_raw_fd(), libc::TIOCGWINSZ, &mut size), size)
+    };
+    (answered == 0 && size.ws_col > 0 && size.ws_row > 0).then_some((size.ws_col, size.ws_row))
+}
+
+/// What comes from the standard input.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Key {
+    /// A byte: that of a key, or one of several.
+    Byte(u8),
+    /// Nothing more comes.
+    End,
+}
+
+/// Ctrl-C, which sends no signal while [`Keys`] exists.
+pub const CTRL_C: u8 = 3;
+/// Ctrl-D.
+pub const CTRL_D: u8 = 4;
+
+/// The standard input, key by key and without an echo where it is a terminal. It is as before when this is dropped.
+pub struct Keys {
+    /// Without a buffer, in which a key could stay.
+    input: File,
+    /// The settings before; `None` where it is no terminal.
+    before: Option<libc::termios>,
+}
+
+impl Keys {
+    /// From now on.
+    ///
+    /// # Errors
+    /// The standard input is closed, or this process has no more descriptors.
+    pub fn start() -> io::Result<Keys> {
+        let own = io::stdin().as_fd().try_clone_to_owned()?;
+        let input = io::stdin().as_raw_fd();
+        // SAFETY: all bytes zero are valid settings, and the pointers are to live ones.
+        let before = unsafe {
+            let mut settings: libc::termios = zeroed();
+            (libc::tcgetattr(input, &mut settings) == 0).then_some(settings)
+        };
+        if let Some(mut settings) = before {
+            settings.c_lflag &= !(libc::ICANON | libc::ECHO | libc::ISIG);
+            settings.c_cc[libc::VMIN] = 1;
+            settings.c_cc[libc::VTIME] = 0;
+            set(&settings);
+        }
+        Ok(Keys { input: own.into(), before })
+    }
+
+    /// The next byte, if one comes within this time.
+    pub fn next(&mut self, limit: Duration) -> Option<Key> {
+        if wait_readable(&[self.input.as_fd()], limit) == 0 {
+            return None;
+        }
+        let mut byte = [0];
+        // A terminal that was closed is an error, and an end.
+        Some(match self.input.read(&mut byte) {
+            Ok(1) => Key::Byte(byte[0]),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => return None,
+            Ok(_) | Err(_) => Key::End,
+        })
+    }
+}
+
+impl Drop for Keys {
+    fn drop(&mut self) {
+        if let Some(before) = &self.before {
+            set(before);
+        }
+    }
+}
+
+/// Settings of the standard input. A terminal that is gone keeps none.
+fn set(settings: &libc::termios) {
+    // SAFETY: the pointer is to live settings.
+    unsafe { libc::tcsetattr(io::stdin().as_raw_fd(), libc::TCSANOW, settings) };
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::net::UnixStream;
+
+    use super::*;
+
+    // covers: daemon
+    #[test]
+    fn what_is_no_terminal_has_no_size() {
+        let (near, _far) = UnixStream::pair().expect("a pair");
+        assert_eq!(size(near.as_fd()), None);
+    }
+}
