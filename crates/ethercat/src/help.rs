@@ -15,8 +15,8 @@ pub const COMMON: &str = "  --master  -m <master>  Masters: comma-separated numb
 ";
 
 /// Options of all commands for a bus without a daemon.
-pub const STANDALONE: &str = "  --main <interface>       Drive the bus at this network interface for the length
-                           of the command, without a daemon. Its slaves are
+pub const STANDALONE: &str = "  --main <interface>       Drive the bus at this network interface as long as
+                           the command runs, without a daemon. Its slaves are
                            brought to PREOP, and stay there.
   --redundant <interface>  That at the other end of a ring.
   --sim <file>             Simulate this segment file instead.

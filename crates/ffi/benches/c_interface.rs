@@ -6,7 +6,7 @@
 //! * The cycles of an application at 1 kHz without and with 50 clients that ask 100 times in a second each.
 //!
 //! `cargo bench -p ringcat-ffi`; with the word `instructions` the first part alone, with a bar that is met, for CI
-//! (`ci/bench`). Without a C compiler or valgrind the parts that need them report that.
+//! (`ci/bench --full`). Without a C compiler or valgrind the parts that need them report that.
 
 #[path = "c_interface/callgrind.rs"]
 mod callgrind;

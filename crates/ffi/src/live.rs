@@ -1,4 +1,4 @@
-//! What any thread reads of the active application, and wishes of it, in atomic words: no allocation, no waiting.
+//! What any thread reads of the active application, and what it requests, in atomic words: no allocation, no waiting.
 
 use std::sync::RwLock;
 

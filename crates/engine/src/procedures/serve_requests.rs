@@ -56,7 +56,7 @@ impl Requests {
         &self.retry
     }
 
-    /// Fails the requests that wait or are under way. A wish for another attempt ends with its application.
+    /// Fails the requests that wait or are under way. A request for another attempt ends with its application.
     pub(crate) fn end(&self) {
         self.retry.take();
         self.all.borrow().iter().for_each(AcyclicSide::end);

@@ -5,7 +5,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 use crate::bell::Bell;
 
-/// The wish for another attempt of failed configurations, for a cyclic thread.
+/// Requests another attempt of failed configurations, for a cyclic thread.
 #[derive(Clone, Debug, Default)]
 pub struct RetryRequest {
     wanted: Arc<AtomicBool>,
@@ -17,14 +17,14 @@ impl RetryRequest {
         RetryRequest { wanted: Arc::default(), bell }
     }
 
-    /// Wishes for it: two atomic words, no allocation, no lock, no waiting. The acyclic half repeats the failed
-    /// configurations of all SubDevices in one of its next turns, once for all wishes until then.
+    /// Requests it: two atomic words, no allocation, no lock, no waiting. The acyclic half repeats the failed
+    /// configurations of all SubDevices in one of its next turns, once for all requests until then.
     pub fn start(&self) {
         self.wanted.store(true, Ordering::Release);
         self.bell.ring();
     }
 
-    /// Takes the wish.
+    /// Takes the request.
     pub(crate) fn take(&self) -> bool {
         self.wanted.load(Ordering::Relaxed) && self.wanted.swap(false, Ordering::Acquire)
     }
