@@ -212,9 +212,9 @@ demo() {
     local too_large=0
     cargo run --release
     cargo run --release -- demo --standby
-    small ringcat 10950000 || too_large=1
+    small ringcat 11050000 || too_large=1
     small ringcatd 7100000 || too_large=1
-    small ethercat 1780000 || too_large=1
+    small ethercat 1850000 || too_large=1
     return "$too_large"
 }
 
