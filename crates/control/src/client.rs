@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::io;
+use std::ops::ControlFlow;
 use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
@@ -45,6 +46,8 @@ pub enum ClientError {
     Connection(ReceiveError),
     /// The daemon refuses.
     Refused(Refusal),
+    /// The client did not wait for the answer.
+    Ended,
 }
 
 impl fmt::Display for ClientError {
@@ -60,6 +63,7 @@ impl fmt::Display for ClientError {
             ),
             ClientError::Connection(error) => write!(f, "connection to ringcatd: {error}"),
             ClientError::Refused(refusal) => write!(f, "ringcatd: {refusal}"),
+            ClientError::Ended => f.write_str("the wait for ringcatd was ended"),
         }
     }
 }
@@ -70,6 +74,7 @@ impl std::error::Error for ClientError {
             ClientError::NoDaemon { cause, .. } | ClientError::NotPermitted { cause, .. } => cause,
             ClientError::Connection(error) => error,
             ClientError::Refused(refusal) => refusal,
+            ClientError::Ended => return None,
         })
     }
 }
@@ -140,19 +145,19 @@ impl Client {
     /// The daemon refuses, or does not answer in time: within a minute, or 10 minutes where flash memory is written.
     pub fn ask(&mut self, master: u32, what: Query, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), ClientError> {
         let limit = what.limit() + BEYOND;
-        self.ask_meanwhile(master, what, bytes, (limit, &mut || ()))
+        self.ask_meanwhile(master, what, bytes, (limit, &mut || ControlFlow::Continue(())))
     }
 
-    /// As [`Client::ask`]; `meanwhile` is called each time that nothing has come for so long.
+    /// As [`Client::ask`]; `meanwhile` is called after each interval `every` without a message, and may end the wait.
     ///
     /// # Errors
-    /// As [`Client::ask`].
+    /// As [`Client::ask`]; `meanwhile` has ended it.
     pub fn ask_meanwhile(
         &mut self,
         master: u32,
         what: Query,
         bytes: Vec<u8>,
-        (every, meanwhile): (Duration, &mut dyn FnMut()),
+        (every, meanwhile): (Duration, &mut dyn FnMut() -> ControlFlow<()>),
     ) -> Result<(Answer, Vec<u8>), ClientError> {
         self.next = self.next.wrapping_add(1);
         let limit = what.limit() + BEYOND;
@@ -161,7 +166,9 @@ impl Client {
         loop {
             let (begin, mut left) = (Instant::now(), limit);
             while wait_readable(&[self.connection.as_fd()], every.min(left)) == 0 && !left.is_zero() {
-                meanwhile();
+                if meanwhile().is_break() {
+                    return Err(ClientError::Ended);
+                }
                 left = limit.saturating_sub(begin.elapsed());
             }
             let message = self.connection.receive(Limits::OWNER, Some(left.max(PAUSE)))?;
@@ -182,7 +189,8 @@ impl Client {
     /// # Errors
     /// As [`Client::ask`].
     pub fn ask_patiently(&mut self, master: u32, what: &Query, bytes: &[u8]) -> Result<(Answer, Vec<u8>), ClientError> {
-        self.ask_patiently_meanwhile(master, what, bytes, (what.limit() + BEYOND, &mut || ()))
+        let every = what.limit() + BEYOND;
+        self.ask_patiently_meanwhile(master, what, bytes, (every, &mut || ControlFlow::Continue(())))
     }
 
     /// As [`Client::ask_patiently`] and [`Client::ask_meanwhile`].
@@ -194,7 +202,7 @@ impl Client {
         master: u32,
         what: &Query,
         bytes: &[u8],
-        (every, meanwhile): (Duration, &mut dyn FnMut()),
+        (every, meanwhile): (Duration, &mut dyn FnMut() -> ControlFlow<()>),
     ) -> Result<(Answer, Vec<u8>), ClientError> {
         let begin = Instant::now();
         loop {
@@ -202,6 +210,9 @@ impl Client {
                 Err(ClientError::Refused(Refusal::Changing { .. } | Refusal::TooManyQueries { .. }))
                     if begin.elapsed() < CHANGE =>
                 {
+                    if meanwhile().is_break() {
+                        return Err(ClientError::Ended);
+                    }
                     std::thread::sleep(PAUSE);
                 }
                 answered => return answered,
@@ -285,10 +296,13 @@ mod tests {
                 let what = Ok(Answer::Masters(Vec::new()));
                 daemon.send(&Content::Answer(Numbered { id: 1, master: 0, what }).into()).expect("the client listens");
             }
+            ControlFlow::Continue(())
         };
         let answered = client.ask_meanwhile(0, Query::Masters, Vec::new(), (PAUSE, &mut meanwhile));
         assert!(matches!(answered, Ok((Answer::Masters(_), _))), "{answered:?}");
         assert_eq!(calls, 3);
+        let ended = client.ask_patiently_meanwhile(0, &Query::Masters, &[], (PAUSE, &mut || ControlFlow::Break(())));
+        assert!(matches!(ended, Err(ClientError::Ended)), "{ended:?}");
     }
 
     // covers: daemon

@@ -101,7 +101,7 @@ pub enum ToolQuery {
         /// Positions of the SubDevices, at most [`MOST_IMAGES`].
         positions: Vec<u16>,
     },
-    /// How far the long transfers of a SubDevice are. Needs no frame.
+    /// Progress of the long transfers of a SubDevice. Sends no frame.
     Transfers {
         /// Its position.
         position: u16,

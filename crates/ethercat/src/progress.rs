@@ -1,6 +1,6 @@
 //! A bar on the standard error while a command waits for something that takes seconds.
 //!
-//! Only a terminal gets one, and no trace of it is left. How far the transfer is comes over a second connection.
+//! Only a terminal gets one, and it is erased when the command ends by itself. Its progress is requested over a second connection.
 
 use std::io::{self, IsTerminal, Write};
 use std::os::fd::AsFd;
@@ -14,11 +14,11 @@ use ringcat_link::terminal;
 
 use crate::append::append;
 
-/// Interval of questions. What takes less has no bar.
+/// Interval of progress requests. A shorter transfer has no bar.
 pub const INTERVAL: Duration = Duration::from_millis(300);
 /// Columns of the bar itself.
 const WIDTH: u64 = 30;
-/// Columns of a terminal that does not say how many it has.
+/// Columns of a terminal that does not report its size.
 const USUAL_COLUMNS: usize = 80;
 
 /// A transfer of a SubDevice.
@@ -41,27 +41,31 @@ pub fn is_shown() -> bool {
 pub struct Bar<'a> {
     name: &'static str,
     transfer: Transfer,
+    /// Of the daemon, until a connection was tried.
+    socket: Option<&'a Path>,
     looker: &'a mut Option<Client>,
     is_drawn: bool,
 }
 
 impl<'a> Bar<'a> {
-    /// That of a command; `looker` asks how far the transfer is, and is connected to `socket` where it is not yet.
-    pub fn new(name: &'static str, transfer: Transfer, socket: &Path, looker: &'a mut Option<Client>) -> Bar<'a> {
-        if looker.is_none() {
-            // A daemon with as many clients as it takes: there is no bar.
-            *looker = Client::connect(socket, "ethercat").ok();
-        }
-        Bar { name, transfer, looker, is_drawn: false }
+    /// That of a command; `looker` is the connection for progress requests. Where it is not there yet, the first request
+    /// connects it to `socket`, if there is one.
+    pub fn new(
+        name: &'static str,
+        transfer: Transfer,
+        socket: Option<&'a Path>,
+        looker: &'a mut Option<Client>,
+    ) -> Bar<'a> {
+        Bar { name, transfer, socket, looker, is_drawn: false }
     }
 
-    /// Shows how far the transfer is now.
+    /// Shows the progress of the transfer.
     pub fn draw(&mut self, output: &mut dyn Write) {
         let Some(line) = self.look() else { return };
         let columns = terminal::size(io::stderr().as_fd()).map_or(USUAL_COLUMNS, |(columns, _)| columns.into());
         // Without the last column: a terminal would begin a line behind it.
         let text: String = text(self.name, &line).chars().take(columns.saturating_sub(1)).collect();
-        // Where the standard error is closed it has no reader.
+        // Errors are ignored: the standard error may be closed.
         let _ = write!(output, "\r{text}\x1b[K").and_then(|()| output.flush());
         self.is_drawn = true;
     }
@@ -73,14 +77,21 @@ impl<'a> Bar<'a> {
         }
     }
 
-    /// How far the transfer is; `None` while it has not begun.
+    /// Progress of the transfer; `None` while it has not begun.
     fn look(&mut self) -> Option<TransferLine> {
         let Transfer { master, position, work } = self.transfer;
+        // The daemon may accept no more clients: there is no bar.
+        if let (None, Some(socket)) = (&self.looker, self.socket.take()) {
+            *self.looker = Client::connect(socket, "ethercat").ok();
+        }
         let ask = Query::Tool(ToolQuery::Transfers { position });
         match self.looker.as_mut()?.ask(master, ask, Vec::new()) {
             Ok((Answer::Tool(ToolAnswer::Transfers(lines)), _)) => lines.into_iter().find(|line| line.work == work),
-            // The answer to the command says why.
-            _ => None,
+            // The answer to the command contains the reason. Another request could wait as long as this one.
+            _ => {
+                *self.looker = None;
+                None
+            }
         }
     }
 }

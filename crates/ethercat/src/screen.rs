@@ -8,10 +8,10 @@ use ringcat_link::terminal;
 
 use crate::append::append;
 
-/// Columns and rows of a terminal that does not say how many it has.
+/// Columns and rows of a terminal that does not report its size.
 const USUAL: (u16, u16) = (80, 24);
 
-/// Written before the first page: the other screen, without a cursor.
+/// Written before the first page: the alternate screen, without a cursor.
 pub const BEGIN: &str = "\x1b[?1049h\x1b[?25l";
 /// Written at the end: the screen that was there before, with a cursor.
 pub const END: &str = "\x1b[?25h\x1b[?1049l";
@@ -21,7 +21,8 @@ pub fn size() -> (u16, u16) {
     terminal::size(io::stdout().as_fd()).unwrap_or(USUAL)
 }
 
-/// Lines in place of what is there: cut at the last column, and a last line that counts those without a place.
+/// Overwrites the screen with lines, cut at the last column. If they do not fit, the last row has the number of the
+/// rest.
 pub fn page(lines: &[String], (columns, rows): (u16, u16)) -> String {
     // A terminal may erase the last column together with what is behind it.
     let (columns, rows) = (usize::from(columns).saturating_sub(1), usize::from(rows).max(1));

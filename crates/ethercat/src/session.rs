@@ -2,7 +2,9 @@
 
 use std::fmt::{self, Arguments as Formatted};
 use std::io::{self, IsTerminal, Write};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use ringcat_control::message::{Answer, MasterState, Query, Snapshot};
 use ringcat_control::socket::to_connect_to;
@@ -17,6 +19,9 @@ use crate::progress::{self, Bar, Transfer};
 use crate::selection::{self, Slave};
 use crate::standalone::{Standalone, Started};
 
+/// Called while an answer is waited for, at this interval; may end the wait.
+type Meanwhile = (Duration, Box<dyn FnMut() -> ControlFlow<()>>);
+
 /// A command at work.
 pub struct Session<'a> {
     /// Name of the command.
@@ -25,8 +30,9 @@ pub struct Session<'a> {
     pub arguments: Arguments,
     socket: &'a Path,
     client: Option<Client>,
-    /// Asks how far a transfer is.
+    /// Second connection, for the progress of a transfer.
     looker: Option<Client>,
+    meanwhile: Option<Meanwhile>,
     /// Links of a bus without a daemon: no other bus is asked then.
     links: Option<String>,
     _standalone: Option<Standalone>,
@@ -48,7 +54,8 @@ impl<'a> Session<'a> {
         output: &'a mut dyn Write,
         errors: &'a mut dyn Write,
     ) -> Session<'a> {
-        Session { name, arguments, socket, client: None, looker: None, links: None, _standalone: None, output, errors }
+        let (client, looker, meanwhile) = (None, None, None);
+        Session { name, arguments, socket, client, looker, meanwhile, links: None, _standalone: None, output, errors }
     }
 
     /// On these links instead, which a daemon of this command drives from the first question on.
@@ -143,7 +150,23 @@ impl<'a> Session<'a> {
     /// # Errors
     /// The daemon refuses, or is not there.
     pub fn ask(&mut self, master: u32, ask: Query, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), Failure> {
-        Ok(self.client()?.ask_patiently(master, &ask, &bytes)?)
+        self.client()?;
+        match self {
+            Session { client: Some(client), meanwhile: Some((every, check)), .. } => {
+                Ok(client.ask_patiently_meanwhile(master, &ask, &bytes, (*every, check.as_mut()))?)
+            }
+            _ => Ok(self.client()?.ask_patiently(master, &ask, &bytes)?),
+        }
+    }
+
+    /// From now on this is called while an answer is waited for, and may end the wait.
+    pub fn check_meanwhile(&mut self, every: Duration, check: Box<dyn FnMut() -> ControlFlow<()>>) {
+        self.meanwhile = Some((every, check));
+    }
+
+    /// Nothing more is called while an answer is waited for.
+    pub fn end_checks(&mut self) {
+        self.meanwhile = None;
     }
 
     /// As [`Session::ask`], for a transfer that may take seconds: a terminal at the standard error shows a bar.
@@ -153,12 +176,18 @@ impl<'a> Session<'a> {
     pub fn ask_with_bar(&mut self, of: Transfer, ask: Query, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), Failure> {
         let is_wanted = !self.arguments.json && !self.arguments.quiet;
         self.client()?;
-        let Session { name, socket, client: Some(client), looker, errors, .. } = self else { return Err(unexpected()) };
+        let Session { name, socket, client: Some(client), looker, errors, links, .. } = self else {
+            return Err(unexpected());
+        };
         if !is_wanted || !progress::is_shown() {
             return Ok(client.ask_patiently(of.master, &ask, &bytes)?);
         }
-        let mut bar = Bar::new(name, of, socket, looker);
-        let mut draw = || bar.draw(errors);
+        // The bus of this command has no other daemon.
+        let mut bar = Bar::new(name, of, links.is_none().then_some(*socket), looker);
+        let mut draw = || {
+            bar.draw(errors);
+            ControlFlow::Continue(())
+        };
         let asked = client.ask_patiently_meanwhile(of.master, &ask, &bytes, (progress::INTERVAL, &mut draw));
         bar.remove(errors);
         Ok(asked?)

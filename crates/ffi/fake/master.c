@@ -89,8 +89,12 @@ void ecrt_release_master(ec_master_t *master)
     pthread_mutex_lock(&of_masters);
     for (at = &masters; *at && *at != master; at = &(*at)->next)
         ;
-    if (*at)
-        *at = master->next;
+    /* Another thread may have released it meanwhile. */
+    if (!*at) {
+        pthread_mutex_unlock(&of_masters);
+        return;
+    }
+    *at = master->next;
     children_end(master);
     master->mark = MARK_ENDED;
     keep_released(master);

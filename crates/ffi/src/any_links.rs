@@ -11,7 +11,7 @@ use ringcat::sim::network::Network;
 use crate::environment::Source;
 
 /// Links of one half: those of a daemon, network interfaces that this process opens, which are the same kind, or a
-/// simulated segment. Each cycle asks several times which kind it is: no kind is in it twice.
+/// simulated segment. Each cycle tests the kind several times, so each kind occurs once.
 pub type AnyLinks = EitherLinks<DaemonLinks, SharedSegment>;
 
 /// Opens the links of the cyclic and of the acyclic half.

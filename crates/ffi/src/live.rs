@@ -39,7 +39,7 @@ impl Live {
         }
     }
 
-    /// Reads words of the active application; `lost` stands for them when the daemon has taken the bus back.
+    /// Reads words of the active application; returns `lost` if the daemon has taken the bus back.
     ///
     /// # Errors
     /// [`Code::BUSY`]: another thread activates or deactivates it.
@@ -49,7 +49,7 @@ impl Live {
         Ok(if words.ownership.as_ref().is_some_and(OwnershipWatch::is_taken_back) { lost } else { read(words) })
     }
 
-    /// Asks for another attempt of failed configurations.
+    /// Requests another attempt of failed configurations.
     ///
     /// # Errors
     /// As [`Live::read`]; [`Code::GONE`]: the daemon has taken the bus back.

@@ -245,6 +245,8 @@ impl Master {
         bus.check_held()?;
         self.refresh()?;
         let draft = locked(&self.draft);
+        // Another thread may have released it meanwhile, which waits for the draft.
+        self.check_reserved()?;
         // Another thread may have activated it meanwhile; its application uses the memory of the domains.
         if self.is_active() {
             report(format_args!("the master is active already"));
@@ -302,7 +304,21 @@ impl Master {
         }
         self.live.follow(bus, draft.found_count(), self.is_ring());
         let begun = Active::new(application, self.has_clock.load(Ordering::Relaxed), bus.ownership());
-        self.application.use_within(CLAIM_LIMIT, |slot| *slot = Slot::Active(begun))
+        let mut begun = Some(begun);
+        let placed = self.application.use_within(CLAIM_LIMIT, |slot| {
+            if let Some(begun) = begun.take() {
+                *slot = Slot::Active(begun);
+            }
+        });
+        // A cyclic call has kept the claim: the bus is as before, so that another activation can follow.
+        if let (Err(_), Some(Active { application, .. })) = (&placed, begun) {
+            let ended = match application.deactivate(LastOutputs::Zero, END_LIMIT) {
+                Ok(ended) => ended,
+                Err(refused) => refused.main_device,
+            };
+            bus.give_links_back(ended.links);
+        }
+        placed
     }
 
     /// Zeroed memory for an image, as long or longer.
@@ -324,6 +340,10 @@ impl Master {
     /// The handle has not reserved the bus, or nothing is active.
     pub fn deactivate(&self) -> Outcome {
         self.check_reserved()?;
+        self.end()
+    }
+
+    fn end(&self) -> Outcome {
         let bus = self.bus()?;
         let taken = self.application.use_within(CLAIM_LIMIT, Slot::take)?;
         let Active { mut application, .. } = taken.ok_or(Code::INVALID)?;
@@ -348,21 +368,25 @@ impl Master {
         draft.clear();
         self.application_time.store(0, Ordering::Relaxed);
         *locked(&self.given) = GivenTimes::default();
-        self.live.follow(&bus, 0, false);
         self.is_active.store(false, Ordering::Release);
-        draft.set_found(bus.found()?);
+        self.live.follow(&bus, 0, false);
+        // Nothing is known of SubDevices once the acyclic half has ended.
+        draft.set_found(bus.found().unwrap_or_default());
         Ok(())
     }
 
     /// Ends everything that the handle has.
     pub fn release(&self) {
+        // An activation in another thread ends before, and a later one finds that nothing is reserved.
+        let was_reserved = {
+            let _draft = locked(&self.draft);
+            self.is_reserved.swap(false, Ordering::AcqRel)
+        };
         if self.is_active() {
-            let _ = self.deactivate();
+            let _ = self.end();
         }
         let access = std::mem::replace(&mut *locked(&self.access), Access::Released);
-        if self.is_reserved.swap(false, Ordering::AcqRel)
-            && let Access::Bus(bus) = access
-        {
+        if let (true, Access::Bus(bus)) = (was_reserved, access) {
             bus.unreserve();
         }
     }

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use crate::process::wait_readable;
 
-/// Columns and rows of a terminal; `None` for anything else, and for a terminal that does not know them.
+/// Columns and rows of a terminal; `None` for anything else, and for a terminal that does not report them.
 pub fn size(terminal: BorrowedFd<'_>) -> Option<(u16, u16)> {
     // SAFETY: all bytes zero is a valid size, and the pointer is to a live one.
     let (answered, size) = unsafe {
@@ -23,7 +23,7 @@ pub fn size(terminal: BorrowedFd<'_>) -> Option<(u16, u16)> {
 pub enum Key {
     /// A byte: that of a key, or one of several.
     Byte(u8),
-    /// Nothing more comes.
+    /// The input has ended.
     End,
 }
 
@@ -41,7 +41,7 @@ pub struct Keys {
 }
 
 impl Keys {
-    /// From now on.
+    /// Switches to single keys.
     ///
     /// # Errors
     /// The standard input is closed, or this process has no more descriptors.
@@ -85,7 +85,7 @@ impl Drop for Keys {
     }
 }
 
-/// Settings of the standard input. A terminal that is gone keeps none.
+/// Settings of the standard input. Errors are ignored: it may be closed.
 fn set(settings: &libc::termios) {
     // SAFETY: the pointer is to live settings.
     unsafe { libc::tcsetattr(io::stdin().as_raw_fd(), libc::TCSANOW, settings) };

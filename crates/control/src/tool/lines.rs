@@ -34,7 +34,8 @@ pub struct MasterReport {
 pub struct CycleReport {
     /// Number of the last one, from 0.
     pub number: u64,
-    /// When it began, in nanoseconds of the application's host.
+    /// When it began, or when its last domain was processed by an application that runs the parts of a cycle itself, in
+    /// nanoseconds of the application's host.
     pub at_ns: u64,
     /// Cycles that began late, that were left out, and after which a domain was incomplete.
     pub late_skipped_incomplete: [u64; 3],
@@ -86,7 +87,7 @@ pub struct TrafficRate {
 pub struct SiiLine {
     /// Position of the SubDevice.
     pub position: u16,
-    /// Bytes of its image; why it was not read.
+    /// Length of its image in bytes, or why it was not read.
     pub bytes: Result<u32, Refusal>,
 }
 
@@ -107,7 +108,7 @@ pub enum TransferWork {
     ObjectWrite,
 }
 
-/// How far a transfer is.
+/// Progress of a transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TransferLine {
     /// What it does.

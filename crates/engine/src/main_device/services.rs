@@ -254,7 +254,7 @@ impl MainDevice {
         self.sii_images.clone()
     }
 
-    /// How far the long transfers of a SubDevice are: EEPROM, files, objects in segments.
+    /// Progress of the long transfers of a SubDevice: EEPROM, files, objects in segments.
     pub fn transfers(&self, subdevice: impl Into<Address>) -> Vec<TransferProgress> {
         self.station(subdevice).map(|station| self.bus().transfers(station)).unwrap_or_default()
     }

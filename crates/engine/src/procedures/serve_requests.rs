@@ -51,7 +51,7 @@ impl Requests {
         &self.bell
     }
 
-    /// With it a cyclic thread asks that failed configurations are repeated.
+    /// The request of a cyclic thread to repeat failed configurations.
     pub(crate) fn retry(&self) -> &RetryRequest {
         &self.retry
     }

@@ -1,4 +1,4 @@
-//! Asks, from any thread, that failed configurations are repeated.
+//! A request, from any thread, to repeat failed configurations.
 
 use alloc::sync::Arc;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -6,26 +6,26 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use crate::bell::Bell;
 
 /// Requests another attempt of failed configurations, for a cyclic thread.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct RetryRequest {
-    wanted: Arc<AtomicBool>,
+    requested: Arc<AtomicBool>,
     bell: Bell,
 }
 
 impl RetryRequest {
     pub(crate) fn new(bell: Bell) -> RetryRequest {
-        RetryRequest { wanted: Arc::default(), bell }
+        RetryRequest { requested: Arc::default(), bell }
     }
 
     /// Requests it: two atomic words, no allocation, no lock, no waiting. The acyclic half repeats the failed
     /// configurations of all SubDevices in one of its next turns, once for all requests until then.
     pub fn start(&self) {
-        self.wanted.store(true, Ordering::Release);
+        self.requested.store(true, Ordering::Release);
         self.bell.ring();
     }
 
     /// Takes the request.
     pub(crate) fn take(&self) -> bool {
-        self.wanted.load(Ordering::Relaxed) && self.wanted.swap(false, Ordering::Acquire)
+        self.requested.load(Ordering::Relaxed) && self.requested.swap(false, Ordering::Acquire)
     }
 }

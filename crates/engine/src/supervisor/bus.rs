@@ -67,7 +67,7 @@ impl Bus {
         self.shared.borrow().long_transfers.begin(station, kind, total)
     }
 
-    /// How far the transfers of a SubDevice are.
+    /// Progress of the transfers of a SubDevice.
     pub(crate) fn transfers(&self, station: StationAddress) -> Vec<TransferProgress> {
         self.shared.borrow().long_transfers.of(station)
     }

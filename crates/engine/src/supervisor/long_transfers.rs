@@ -1,4 +1,4 @@
-//! How far long transfers of SubDevices are: EEPROMs, files, objects in segments.
+//! Progress of long transfers of SubDevices: EEPROMs, files, objects in segments.
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;
@@ -24,7 +24,7 @@ pub enum TransferKind {
     ObjectWrite,
 }
 
-/// How far a transfer is.
+/// Progress of a transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct TransferProgress {
@@ -56,7 +56,7 @@ impl LongTransfers {
         UnderWayTransfer { transfers: self.clone(), transfer }
     }
 
-    /// How far those of a SubDevice are.
+    /// Progress of those of a SubDevice.
     pub(crate) fn of(&self, station: StationAddress) -> Vec<TransferProgress> {
         let transfers = self.0.borrow();
         let its = transfers.iter().filter(|it| it.station == station);

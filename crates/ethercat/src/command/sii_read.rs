@@ -57,8 +57,7 @@ fn corrupted() -> Failure {
     Failure::failed("SII data seem to be corrupted!")
 }
 
-/// A line for each selected SubDevice. Those that cannot be read, or not understood, do not keep others from being
-/// printed.
+/// A line for each selected SubDevice. Those that cannot be read or decoded do not prevent the output of the others.
 fn print_json(session: &mut Session<'_>) -> Result<(), Failure> {
     let (master, positions) = session.some_slaves()?;
     let mut failure = None;
@@ -83,7 +82,7 @@ type Images = Vec<(u16, Result<Vec<u8>, Failure>)>;
 
 fn read(session: &mut Session<'_>, master: u32, positions: &[u16]) -> Result<Images, Failure> {
     let ask = Query::Tool(ToolQuery::SiiImages { positions: positions.to_vec() });
-    // A bar shows how far the last one is, which all others accompany.
+    // Where a bar is shown, there is one position.
     let position = positions.last().copied().unwrap_or(0);
     let transfer = Transfer { master, position, work: TransferWork::SiiRead };
     let (answer, images) = session.ask_with_bar(transfer, ask, Vec::new())?;

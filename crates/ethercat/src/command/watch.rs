@@ -1,6 +1,9 @@
 //! `watch`: a live table of states, working counters, ring, clocks and cycles. Not a command of the original tool.
 
+use std::cell::RefCell;
 use std::io::{self, IsTerminal};
+use std::ops::ControlFlow;
+use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 use ringcat_control::client::ClientError;
@@ -15,9 +18,9 @@ use crate::screen;
 use crate::session::Session;
 use crate::shape::{Command, Output};
 
-/// Interval of questions.
+/// Interval of the requests.
 const REFRESH: Duration = Duration::from_millis(500);
-/// Interval at which keys, signals and the size of the terminal are seen.
+/// Interval at which keys, signals and the size of the terminal are checked.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// The command.
@@ -40,7 +43,7 @@ once. Not a command of IgH.
     run,
 };
 
-/// Cycles of a master when they were asked for last.
+/// Cycles of a master at the previous request.
 #[derive(Clone, Copy)]
 struct Before {
     master: u32,
@@ -49,26 +52,52 @@ struct Before {
 
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let mut before = Vec::new();
-    if session.arguments.once || !io::stdout().is_terminal() {
+    if session.arguments.once || !io::stdout().is_terminal() || !io::stdin().is_terminal() {
         let lines = table(session, &mut before)?;
         return session.write_text(&lines.concat());
     }
-    // A mistake is said on the screen that stays.
+    // A failure of the first table is reported on the normal screen.
     let first = table(session, &mut before)?;
-    let signals = HeldSignals::hold();
-    let mut keys = Keys::start()?;
+    let end = Rc::new(RefCell::new(End { signals: HeldSignals::hold(), keys: Keys::start()? }));
+    let meanwhile = Rc::clone(&end);
+    session.check_meanwhile(LOOK, Box::new(move || meanwhile.borrow_mut().check(Duration::ZERO)));
     session.write(screen::BEGIN.as_bytes())?;
-    let watched = draw(session, &mut before, first, (&signals, &mut keys));
+    let watched = match draw(session, &mut before, first, &end) {
+        Err(Failure::Asked(ClientError::Ended)) => Ok(()),
+        watched => watched,
+    };
     let left = session.write(screen::END.as_bytes()).and_then(|()| session.flush());
+    session.end_checks();
     watched.and(left)
 }
 
-/// Draws the table until the user has seen enough.
+/// What ends the table: keys and signals.
+struct End {
+    signals: HeldSignals,
+    keys: Keys,
+}
+
+impl End {
+    /// Waits so long for a key that ends the table, and looks for signals.
+    fn check(&mut self, limit: Duration) -> ControlFlow<()> {
+        let is_over = match self.keys.next(limit) {
+            Some(Key::Byte(byte)) => matches!(byte, b'q' | b'Q' | CTRL_C | CTRL_D),
+            Some(Key::End) => true,
+            None => false,
+        };
+        match is_over || self.signals.wait(Duration::ZERO).is_some() {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    }
+}
+
+/// Draws the table until a key or a signal ends it.
 fn draw(
     session: &mut Session<'_>,
     before: &mut Vec<Before>,
     mut table_now: Vec<String>,
-    (signals, keys): (&HeldSignals, &mut Keys),
+    end: &RefCell<End>,
 ) -> Result<(), Failure> {
     let (mut drawn, mut asked) = (None, Instant::now());
     loop {
@@ -82,12 +111,7 @@ fn draw(
             session.write(screen::page(&table_now, size).as_bytes())?;
             session.flush()?;
         }
-        let is_over = match keys.next(LOOK) {
-            Some(Key::Byte(byte)) => matches!(byte, b'q' | b'Q' | CTRL_C | CTRL_D),
-            Some(Key::End) => true,
-            None => false,
-        };
-        if is_over || signals.wait(Duration::ZERO).is_some() {
+        if end.borrow_mut().check(LOOK).is_break() {
             return Ok(());
         }
     }

@@ -148,7 +148,7 @@ fn an_sii_that_was_read_is_shown_again_only_while_it_is_unchanged() {
 
 // covers: daemon, 3.8
 #[test]
-fn subdevices_that_change_places_under_power_are_told_apart() {
+fn subdevices_that_change_places_under_power_are_distinguished() {
     let segment = "[segment]\n[[device]]\ntype = \"digital-input-8\"\n[[device]]\ntype = \"digital-input-8\"\n";
     let segment = ringcat::sim::segment::Segment::from_toml(segment, std::path::Path::new("."));
     let bench = Bench::start(vec![segment.expect("it is right")]);

@@ -33,7 +33,7 @@ int main(void)
     ec_master_state_t state = {0, 0, 0};
     ec_slave_info_t slave;
     ec_slave_config_t *sc;
-    unsigned int position;
+    unsigned int position, count;
 
     CHECK((master = ecrt_request_master(0)) && (domain = ecrt_master_create_domain(master)));
     CHECK(ecrt_master(master, &info) == 0);
@@ -43,7 +43,8 @@ int main(void)
         CHECK(sc && ecrt_slave_config_reg_pdo_entry_pos(sc, 0, 0, 0, domain, NULL) >= 0);
     }
     CHECK(ecrt_master_activate(master) == 0);
-    while (state.al_states != EC_AL_STATE_OP) {
+    for (count = 0; state.al_states != EC_AL_STATE_OP; count++) {
+        CHECK(count < 20000);
         cycle();
         ecrt_master_state(master, &state);
     }

@@ -1,4 +1,4 @@
-//! Whole EEPROMs as they were read, for the next question.
+//! Whole EEPROMs as they were read, for the next request.
 //!
 //! An image is shown again only where the EEPROM is certainly unchanged. Each read or write of an EEPROM, from either
 //! side of the controller, changes the address register of its SII interface, and a start clears it. After each read
@@ -18,12 +18,12 @@ use super::eeprom::Eeprom;
 use super::pace::Pace;
 use super::program::{Access, SiiProgramError};
 use super::{IDENTITY_WORD, MAX_WORDS, bytes_before};
-use crate::supervisor::Bus;
 use crate::supervisor::long_transfers::TransferKind;
+use crate::supervisor::{Bus, BusError};
 
-/// Most bytes of all images: beyond it the one that was not asked for the longest is dropped.
-const MOST_BYTES: usize = 1 << 20;
-/// Words that are read between two notes of the progress.
+/// Most bytes of all images: above it the image whose last request is oldest is dropped.
+const MOST_BYTES: usize = 4 << 20;
+/// Words that are read between two updates of the progress.
 const PART: u32 = 32;
 /// Registers from SII_CONFIGURATION to the first two bytes of SII_DATA.
 const REGISTERS: usize = 10;
@@ -32,7 +32,7 @@ const MARK_BYTES: usize = 6;
 /// Words that are compared with the image: the identity, and before it those that the controller loads.
 const COMPARED: [(u32, u32); 2] = [(IDENTITY_WORD, 8), (0, IDENTITY_WORD)];
 
-/// A number in the registers of address and data. The address is behind the largest EEPROM. Of the data registers,
+/// A number in the registers of address and data. The address is behind the largest EEPROM that is read. Of the data registers,
 /// only the first two bytes can be written by any controller.
 type Mark = [u8; MARK_BYTES];
 
@@ -43,7 +43,7 @@ struct Image {
     bytes: Rc<[u8]>,
 }
 
-/// Images by station address, the one that was asked for last at the end.
+/// Images by station address, in the order of their last request.
 #[derive(Clone, Debug, Default)]
 pub struct SiiImages {
     images: Rc<RefCell<Vec<Image>>>,
@@ -56,7 +56,7 @@ impl SiiImages {
         self.keep_those(|kept| kept != station);
     }
 
-    /// Drops the images of all SubDevices but those of this kind.
+    /// Keeps only the images of stations for which `is_kept` is true.
     pub fn keep_those(&self, is_kept: impl Fn(StationAddress) -> bool) {
         self.images.borrow_mut().retain(|image| is_kept(image.station));
     }
@@ -76,7 +76,7 @@ impl SiiImages {
         }
     }
 
-    /// A mark that no image had. Those of another MainDevice begin at another number, by the time.
+    /// A mark that no image had. The first one of a MainDevice comes from its clock.
     fn next_mark(&self, bus: &Bus) -> Mark {
         let last = self.marks.get();
         let next = if last == 0 { bus.now().0 as u32 | 1 } else { last.wrapping_add(1) };
@@ -96,7 +96,8 @@ pub async fn read(
 ) -> Result<Vec<u8>, SiiProgramError> {
     if let Some((mark, bytes)) = images.of(station) {
         images.forget(station);
-        if let Some(mark) = prove(bus, station, images, cache, (&mark, &bytes)).await? {
+        // An error is no proof, and the read that follows reports it.
+        if let Ok(Some(mark)) = prove(bus, station, images, cache, (&mark, &bytes)).await {
             images.keep(station, mark, bytes.clone());
             return Ok(bytes.to_vec());
         }
@@ -111,11 +112,8 @@ pub async fn read_anew(bus: &Bus, station: StationAddress, images: &SiiImages) -
     let work = async {
         let words = access.size().await?;
         let bytes = read_words(bus, station, words.min(MAX_WORDS)).await?;
-        let mark = images.next_mark(bus);
-        bus.fpwr(station, map::SII_ADDRESS, &mark).await?;
-        let registers = bus.fprd_array(station, map::SII_CONFIGURATION).await?;
-        // The content of an emulated EEPROM may change without a command.
-        if is_marked(&registers, &mark) && !control_of(&registers).emulated {
+        // What was read is right without a mark, too.
+        if let Ok(Some(mark)) = mark(bus, station, images).await {
             images.keep(station, mark, bytes.as_slice().into());
         }
         Ok(bytes)
@@ -125,7 +123,16 @@ pub async fn read_anew(bus: &Bus, station: StationAddress, images: &SiiImages) -
     bytes
 }
 
-/// The first words of an EEPROM, and how far it is meanwhile.
+/// Writes a mark; `None` if the controller does not hold it, or emulates its EEPROM, whose content may change without a
+/// command.
+async fn mark(bus: &Bus, station: StationAddress, images: &SiiImages) -> Result<Option<Mark>, BusError> {
+    let mark = images.next_mark(bus);
+    bus.fpwr(station, map::SII_ADDRESS, &mark).await?;
+    let registers = bus.fprd_array(station, map::SII_CONFIGURATION).await?;
+    Ok((is_marked(&registers, &mark) && !control_of(&registers).emulated).then_some(mark))
+}
+
+/// The first words of an EEPROM, with its progress.
 async fn read_words(bus: &Bus, station: StationAddress, words: u32) -> Result<Vec<u8>, SiiProgramError> {
     let length = bytes_before(words);
     let under_way = bus.begin_transfer(station, TransferKind::EepromRead, Some(length as u64));
@@ -156,7 +163,15 @@ async fn prove(
         return compare(bus, station, images, cache, (&registers, image)).await;
     }
     let access = Access::begin(bus, station).await?;
-    let compared = compare(bus, station, images, cache, (&registers, image)).await;
+    let work = async {
+        // The PDI may have had the EEPROM since.
+        let registers = bus.fprd_array(station, map::SII_CONFIGURATION).await?;
+        match is_marked(&registers, mark) {
+            true => compare(bus, station, images, cache, (&registers, image)).await,
+            false => Ok(None),
+        }
+    };
+    let compared = work.await;
     access.end().await?;
     compared
 }
@@ -207,7 +222,7 @@ mod tests {
 
     // covers: daemon
     #[test]
-    fn images_are_bounded_and_the_one_not_asked_for_the_longest_goes() {
+    fn images_are_bounded_and_the_least_recently_requested_is_dropped() {
         let images = SiiImages::default();
         let mark = [0; MARK_BYTES];
         for number in 0..16 {

@@ -1,4 +1,4 @@
-//! SIIs, and how far long transfers are.
+//! SIIs, and the progress of long transfers.
 
 use ringcat_control::message::Answer;
 use ringcat_control::tool::{MOST_IMAGES, MOST_TRANSFERS, SiiLine, ToolAnswer, TransferLine, TransferWork};
@@ -11,10 +11,15 @@ use crate::error::Error;
 use crate::job::Job;
 use crate::supervisor_thread::SupervisorThread;
 
-/// SIIs of several SubDevices, at the same time.
+/// SIIs of several SubDevices, at the same time. If the bus passes to another process meanwhile, the query as a whole
+/// ends, and is sent again to the next one.
 pub(super) fn images(supervisor: &SupervisorThread, positions: &[u16]) -> Answered {
     if positions.len() > MOST_IMAGES {
         return Err(expected(&format!("at most {MOST_IMAGES} SubDevices, not {}", positions.len())));
+    }
+    // Each read of an EEPROM that is never kept takes its time once more.
+    if (1..positions.len()).any(|at| positions[..at].contains(&positions[at])) {
+        return Err(expected("each SubDevice once"));
     }
     let start = |position: &u16| {
         let job = supervisor.background().subdevice(Position(*position)).within(LONG).sii_image();
@@ -23,18 +28,21 @@ pub(super) fn images(supervisor: &SupervisorThread, positions: &[u16]) -> Answer
     let jobs: Vec<(u16, Job<_>)> = positions.iter().map(start).collect();
     let (mut lines, mut bytes) = (Vec::new(), Vec::new());
     for (position, job) in jobs {
-        let read = job.wait().and_then(|read| read.map_err(Error::from)).map_err(|error| refusal(&error));
-        let length = read.map(|mut image| {
-            let length = image.len() as u32;
-            bytes.append(&mut image);
-            length
-        });
-        lines.push(SiiLine { position, bytes: length });
+        let read = match job.wait().and_then(|read| read.map_err(Error::from)) {
+            Ok(mut image) => {
+                let length = image.len() as u32;
+                bytes.append(&mut image);
+                Ok(length)
+            }
+            Err(Error::Gone) => return Err(refusal(&Error::Gone)),
+            Err(error) => Err(refusal(&error)),
+        };
+        lines.push(SiiLine { position, bytes: read });
     }
     Ok((Answer::Tool(ToolAnswer::SiiImages(lines)), bytes))
 }
 
-/// How far the transfers of a SubDevice are.
+/// Progress of the transfers of a SubDevice.
 pub(super) fn transfers(supervisor: &SupervisorThread, position: u16) -> Result<Vec<TransferLine>, Error> {
     let transfers = supervisor.act(move |engine| engine.transfers(Position(position)))?;
     Ok(transfers.into_iter().filter_map(line).take(MOST_TRANSFERS).collect())
