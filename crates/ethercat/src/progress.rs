@@ -1,6 +1,7 @@
 //! A bar on the standard error while a command waits for something that takes seconds.
 //!
-//! Only a terminal gets one, and it is erased when the command ends by itself. Its progress is requested over a second connection.
+//! Only a terminal gets one, and it is erased when the command ends by itself. Its progress is requested over a second
+//! connection.
 
 use std::io::{self, IsTerminal, Write};
 use std::os::fd::AsFd;
@@ -48,8 +49,8 @@ pub struct Bar<'a> {
 }
 
 impl<'a> Bar<'a> {
-    /// That of a command; `looker` is the connection for progress requests. Where it is not there yet, the first request
-    /// connects it to `socket`, if there is one.
+    /// That of a command; `looker` is the connection for progress requests. Where there is none yet, the first request
+    /// connects it to `socket`, if given.
     pub fn new(
         name: &'static str,
         transfer: Transfer,

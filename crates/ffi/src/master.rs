@@ -3,14 +3,14 @@
 //! A handle that only opened the master may ask for information and use mailboxes, beside the one that reserved it. The
 //! application exists between activation and deactivation; cyclic calls use it by a claim that never waits.
 
+mod activation;
+
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use ringcat::daemon::{ClientError, SegmentOverview};
-use ringcat::{
-    ClockDatagrams, Declaration, DomainId, Instant, LastOutputs, Link, Links, ReferenceClock, Services, SubDeviceId,
-};
+use ringcat::{DomainId, LastOutputs, Link, ReferenceClock, Services, SubDeviceId};
 
 use crate::active::{Active, Slot};
 use crate::bus::Bus;
@@ -18,7 +18,7 @@ use crate::claim::Claim;
 use crate::code::{Code, Outcome, report};
 use crate::draft::Draft;
 use crate::environment::socket;
-use crate::given_time::{GivenTimes, passed_since};
+use crate::given_time::GivenTimes;
 use crate::host::{check_memory, variable, watch_forks};
 use crate::live::{Live, Words};
 use crate::locks::locked;
@@ -30,8 +30,6 @@ use crate::types::SegmentState;
 const END_LIMIT: Duration = Duration::from_secs(5);
 /// Longest wait for a cyclic call of another thread.
 const CLAIM_LIMIT: Duration = Duration::from_secs(1);
-/// Memory of an image is allocated in pieces of this size, so that later applications can use it again.
-const MEMORY_GRAIN: usize = 4096;
 
 /// What a handle has of its master.
 #[derive(Debug)]
@@ -268,70 +266,6 @@ impl Master {
             Err(_) => draft.domains().iter().for_each(|words| words.set_memory(std::ptr::null_mut())),
         }
         begun
-    }
-
-    fn begin(&self, bus: &Bus, declaration: Declaration, draft: &Draft) -> Outcome {
-        let links = bus.take_links().ok_or(Code::BUSY)?;
-        self.is_ring.store(links.addresses().redundant.is_some(), Ordering::Relaxed);
-        let supervisor = bus.supervisor().clone();
-        if let Err(error) = supervisor.load(declaration) {
-            bus.give_links_back(links);
-            report(format_args!("master {}: {error}", bus.master()));
-            return Err(Code::INVALID);
-        }
-        let mut application = match supervisor.apply(links) {
-            Ok(application) => application,
-            Err(refused) => {
-                report(format_args!("master {}: {}", bus.master(), refused.error));
-                let ringcat::Ended { supervisor, links, .. } = refused.main_device;
-                let unused = (0..draft.domains().len()).filter_map(|domain| supervisor.unused_memory(DomainId(domain)));
-                locked(&self.memory).extend(unused);
-                bus.give_links_back(links);
-                return Err(Code::INVALID);
-            }
-        };
-        application.set_clock_datagrams(ClockDatagrams::Called);
-        if let Some(interval) = draft.send_interval() {
-            application.expect_sends_every(interval);
-        }
-        let now = application.now();
-        let GivenTimes { first, last } = std::mem::take(&mut *locked(&self.given));
-        if let Some((time, at)) = first {
-            application.set_first_application_time(time, Instant(now.0.saturating_sub(passed_since(at))));
-        }
-        if let Some((time, at)) = last {
-            application.set_application_time(time.wrapping_add(passed_since(at)), now);
-        }
-        self.live.follow(bus, draft.found_count(), self.is_ring());
-        let begun = Active::new(application, self.has_clock.load(Ordering::Relaxed), bus.ownership());
-        let mut begun = Some(begun);
-        let placed = self.application.use_within(CLAIM_LIMIT, |slot| {
-            if let Some(begun) = begun.take() {
-                *slot = Slot::Active(begun);
-            }
-        });
-        // A cyclic call has kept the claim: the bus is as before, so that another activation can follow.
-        if let (Err(_), Some(Active { application, .. })) = (&placed, begun) {
-            let ended = match application.deactivate(LastOutputs::Zero, END_LIMIT) {
-                Ok(ended) => ended,
-                Err(refused) => refused.main_device,
-            };
-            bus.give_links_back(ended.links);
-        }
-        placed
-    }
-
-    /// Zeroed memory for an image, as long or longer.
-    fn take_memory(&self, bytes: usize) -> &'static mut [u8] {
-        let mut unused = locked(&self.memory);
-        let fitting = unused.iter().position(|memory| memory.len() >= bytes);
-        match fitting.map(|place| unused.swap_remove(place)) {
-            Some(memory) => {
-                memory.fill(0);
-                memory
-            }
-            None => Vec::leak(vec![0; bytes.next_multiple_of(MEMORY_GRAIN)]),
-        }
     }
 
     /// Ends the application: all SubDevices go to PREOP, the declaration is empty again.

@@ -123,8 +123,9 @@ impl<S: Services> SubDevice<S> {
         self.ask(move |engine, subdevice| engine.start_sii_read(subdevice).ended())
     }
 
-    /// The whole EEPROM: the image of an earlier read if the EEPROM is proved to be unchanged, otherwise a new read. The
-    /// proof is a number that only that read has left in the registers of the EEPROM interface, and the first words.
+    /// The whole EEPROM: the image of an earlier read if the EEPROM is proved to be unchanged, otherwise a new read.
+    /// The proof is a number that only that read has left in the registers of the EEPROM interface, and the first
+    /// words.
     pub fn sii_image(self) -> S::Outcome<Vec<u8>, SubDeviceError> {
         self.ask(move |engine, subdevice| engine.start_sii_image(subdevice).ended())
     }

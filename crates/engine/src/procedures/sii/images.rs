@@ -32,8 +32,8 @@ const MARK_BYTES: usize = 6;
 /// Words that are compared with the image: the identity, and before it those that the controller loads.
 const COMPARED: [(u32, u32); 2] = [(IDENTITY_WORD, 8), (0, IDENTITY_WORD)];
 
-/// A number in the registers of address and data. The address is behind the largest EEPROM that is read. Of the data registers,
-/// only the first two bytes can be written by any controller.
+/// A number in the registers of address and data. The address is behind the largest EEPROM that is read. Of the data
+/// registers, only the first two bytes can be written by any controller.
 type Mark = [u8; MARK_BYTES];
 
 #[derive(Debug)]
