@@ -3,7 +3,6 @@
  * with the second table of docs/ecrt.md. What the manual allows in any phase is called from two threads at once, before
  * and while the application is active.
  */
-#include <errno.h>
 #include <limits.h>
 #include <pthread.h>
 #include <stdio.h>
@@ -11,23 +10,9 @@
 #include <time.h>
 
 #include "ecrt.h"
+#include "names.h"
 
 enum { OUTPUTS = 1, DRIVE = 2, PROTOCOLS = 3, AXES = 4, COUNT = 5 };
-
-static const char *name_of(long result)
-{
-    static const struct { long code; const char *name; } names[] = {
-        {0, "0"}, {-EPERM, "EPERM"}, {-ENOENT, "ENOENT"}, {-EIO, "EIO"}, {-ENXIO, "ENXIO"}, {-EBUSY, "EBUSY"},
-        {-EEXIST, "EEXIST"}, {-ENODEV, "ENODEV"}, {-EINVAL, "EINVAL"}, {-EFAULT, "EFAULT"}, {-ENOBUFS, "ENOBUFS"},
-        {-EOVERFLOW, "EOVERFLOW"}, {-ETIMEDOUT, "ETIMEDOUT"}, {-EPROTONOSUPPORT, "EPROTONOSUPPORT"},
-    };
-    size_t i;
-
-    for (i = 0; i < sizeof names / sizeof *names; i++)
-        if (names[i].code == result)
-            return names[i].name;
-    return result > 0 ? "positive" : "unknown";
-}
 
 #define CODE(function, what, arguments) printf("%s|%s|%s\n", #function, what, name_of((long) function arguments))
 #define POINTER(function, what, arguments) \
