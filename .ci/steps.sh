@@ -214,7 +214,7 @@ demo() {
     cargo run --release -- demo --standby
     small ringcat 11050000 || too_large=1
     small ringcatd 7100000 || too_large=1
-    small ethercat 1870000 || too_large=1
+    small ethercat 1850000 || too_large=1
     return "$too_large"
 }
 
