@@ -153,7 +153,11 @@ impl Network {
     /// As [`Network::new`].
     pub fn from_description(segment: Segment) -> Result<Network, SegmentError> {
         let devices = segment.devices.into_iter().map(Device::new).collect();
-        Network::new(devices, segment.cables, segment.options)
+        let mut network = Network::new(devices, segment.cables, segment.options)?;
+        for (at, fault) in segment.faults {
+            network.schedule(SimTime::ZERO + at, fault);
+        }
+        Ok(network)
     }
 
     /// The time up to which all events have been processed.

@@ -7,16 +7,19 @@
 mod described;
 mod devices;
 mod error;
+mod faults;
 mod file;
 mod format;
 mod keys;
 mod services;
 mod topology;
 
+use core::time::Duration;
 use std::path::Path;
 
 use crate::cable::CableSpec;
 use crate::description::DeviceDescription;
+use crate::fault::Fault;
 use crate::network::NetworkOptions;
 use described::Sources;
 
@@ -41,6 +44,8 @@ pub struct Segment {
     pub devices: Vec<DeviceDescription>,
     /// The cables.
     pub cables: Vec<CableSpec>,
+    /// Faults, with the time since the beginning of the simulation.
+    pub faults: Vec<(Duration, Fault)>,
 }
 
 /// Longest segment file: 65,535 devices take a few megabytes.
@@ -75,7 +80,8 @@ impl Segment {
     ///
     /// # Errors
     /// Text that is not TOML, unknown or missing keys, values out of range, unknown device types, SII images that
-    /// cannot be read, duplicate names, and cables with a missing end or at a port with another cable.
+    /// cannot be read, duplicate names, cables with a missing end or at a port with another cable, and faults of
+    /// cables or devices that do not exist.
     pub fn from_toml(text: &str, base_dir: &Path) -> Result<Segment, SegmentError> {
         Segment::from_toml_with(text, base_dir, &NoDescriptions)
     }
@@ -94,11 +100,13 @@ impl Segment {
         let options = file.options(text)?;
         let plan = devices::describe(&file, text, &Sources { base_dir, descriptions }, options.seed)?;
         let cables = topology::plug(&file, text, &plan)?;
+        let faults = faults::planned(&file, text, &plan, cables.len())?;
         Ok(Segment {
             name: file.segment.name.clone().unwrap_or_else(|| String::from("segment")),
             options,
             devices: plan.into_iter().map(|device| device.description).collect(),
             cables,
+            faults,
         })
     }
 }

@@ -107,3 +107,29 @@ fn a_configuration_is_for_the_subdevice_at_its_position_alone() {
     let (output, ended) = on_segment(&places, &segment, &[]);
     assert_eq!(ended, Ok(()), "{output}");
 }
+
+/// The segment file of the example cuts and repairs two cables.
+// covers: c-interface, ring-cut, ring-status
+#[test]
+fn the_example_of_a_ring_stays_in_op_while_its_cables_are_cut_and_repaired() {
+    let Some(ring) = program(&root().join("examples/c/ring.c"), &[]) else { return };
+    let (output, ended) = on_segment(&ring, &root().join("examples/c/ring.toml"), &["5500"]);
+    println!("{output}");
+    assert_eq!(ended, Ok(()), "{output}");
+    let changes = [
+        "6 SubDevice(s) in OP.",
+        "The ring is closed.",
+        "Redundant link: up, 4 SubDevice(s).",
+        "The ring is open.",
+        "Redundant link: up, 0 SubDevice(s).",
+        "The ring is closed.",
+        "Redundant link: down, 0 SubDevice(s).",
+        "The ring is open.",
+        "Redundant link: up, 0 SubDevice(s).",
+        "The ring is closed.",
+    ];
+    let mut lines = output.lines();
+    for change in changes {
+        assert!(lines.any(|line| line.ends_with(change)), "{change} did not follow: {output}");
+    }
+}

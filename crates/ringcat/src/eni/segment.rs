@@ -24,5 +24,11 @@ pub fn segment(eni: &Eni, configuration: &Configuration, ring: bool) -> Segment 
     device::make_names_unique(eni, &mut devices);
     let plugged_into: Vec<_> = configuration.subdevices.iter().map(|facts| facts.plugged_into).collect();
     let cables = cables::plug(&mut devices, &plugged_into, ring);
-    Segment { name: eni.main_device.name.clone(), options: NetworkOptions::default(), devices, cables }
+    Segment {
+        name: eni.main_device.name.clone(),
+        options: NetworkOptions::default(),
+        devices,
+        cables,
+        faults: Vec::new(),
+    }
 }

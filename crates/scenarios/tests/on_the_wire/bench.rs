@@ -39,7 +39,8 @@ static PROGRAMS: LazyLock<PathBuf> = LazyLock::new(|| {
         return profile;
     }
     let mut build = Command::new(env!("CARGO"));
-    build.args(["build", "--quiet", "--workspace", "--bin", "ringcat", "--example", "ethercrab_client"]);
+    build.args(["build", "--quiet", "--workspace", "--lib", "--bin", "ringcat", "--bin", "ringcatd"]);
+    build.args(["--example", "ethercrab_client"]);
     build.arg("--target-dir").arg(profile.parent().expect("a target directory"));
     if !cfg!(debug_assertions) {
         build.arg("--release");

@@ -6,6 +6,7 @@
 //! ends print their delays.
 
 mod bench;
+mod c_interface;
 mod cables;
 mod captures;
 mod clocks;

@@ -19,6 +19,8 @@ pub(super) struct File {
     pub(super) device: Vec<Spanned<DeviceEntry>>,
     #[serde(default)]
     pub(super) cable: Vec<Spanned<CableEntry>>,
+    #[serde(default)]
+    pub(super) fault: Vec<Spanned<FaultEntry>>,
 }
 
 /// Table `[segment]`.
@@ -93,6 +95,17 @@ pub(super) struct CableEntry {
     pub(super) from: Spanned<String>,
     pub(super) to: Spanned<String>,
     pub(super) delay_ns: Option<u64>,
+}
+
+/// One table of `[[fault]]`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FaultEntry {
+    pub(super) at_ms: Spanned<f64>,
+    pub(super) cut: Option<Spanned<u64>>,
+    pub(super) heal: Option<Spanned<u64>>,
+    pub(super) power_off: Option<Spanned<String>>,
+    pub(super) power_on: Option<Spanned<String>>,
 }
 
 impl File {

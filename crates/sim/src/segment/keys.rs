@@ -100,7 +100,10 @@ pub(super) const DEVICE: Keys = &[
 
 /// Tables `[[cable]]`; the first two are required.
 pub(super) const CABLE: Keys = &[("from", Text), ("to", Text), ("delay_ns", BITS_63)];
-const CABLE_REQUIRED: [&str; 2] = ["from", "to"];
+
+/// Tables `[[fault]]`; the first one is required, and one of the others.
+pub(super) const FAULT: Keys =
+    &[("at_ms", Number), ("cut", BITS_63), ("heal", BITS_63), ("power_off", Text), ("power_on", Text)];
 
 /// Refuses keys that are unknown, missing, given twice or of another type. Text that is no TOML is left to its reader.
 pub(super) fn check(text: &str) -> Result<(), SegmentError> {
@@ -115,7 +118,7 @@ pub(super) fn check(text: &str) -> Result<(), SegmentError> {
             ("segment", other) => {
                 return at(format!("segment: expected one table [segment], got {}", Found(other)), key.span());
             }
-            (name @ ("device" | "cable"), DeValue::Array(tables)) => {
+            (name @ ("device" | "cable" | "fault"), DeValue::Array(tables)) => {
                 for (number, table) in (1..).zip(tables) {
                     let DeValue::Table(keys) = table.get_ref() else {
                         let found = Found(table.get_ref());
@@ -124,11 +127,11 @@ pub(super) fn check(text: &str) -> Result<(), SegmentError> {
                     check_entry(text, name, number, keys, &table.span())?;
                 }
             }
-            (name @ ("device" | "cable"), other) => {
+            (name @ ("device" | "cable" | "fault"), other) => {
                 return at(format!("{name}: expected tables [[{name}]], got {}", Found(other)), key.span());
             }
             (other, _) => {
-                let known = "expected [segment], [[device]] or [[cable]]";
+                let known = "expected [segment], [[device]], [[cable]] or [[fault]]";
                 return at(format!("unknown table or key \"{}\": {known}", other.escape_debug()), key.span());
             }
         }
@@ -136,7 +139,7 @@ pub(super) fn check(text: &str) -> Result<(), SegmentError> {
     Ok(())
 }
 
-/// One `[[device]]` or `[[cable]]`.
+/// One `[[device]]`, `[[cable]]` or `[[fault]]`.
 fn check_entry(
     text: &str,
     name: &str,
@@ -150,10 +153,14 @@ fn check_entry(
         let called = called.map_or_else(|| format!("number {number}"), str::to_owned);
         return check_table(text, "[[device]]", Some(&called), table, DEVICE);
     }
-    check_table(text, "[[cable]]", None, table, CABLE)?;
-    match CABLE_REQUIRED.into_iter().find(|key| !table.contains_key(*key)) {
+    let (title, keys, required, expected): (_, _, &[&str], _) = match name {
+        "cable" => ("[[cable]]", CABLE, &["from", "to"], "from and to"),
+        _ => ("[[fault]]", FAULT, &["at_ms"], "at_ms and a fault"),
+    };
+    check_table(text, title, None, table, keys)?;
+    match required.iter().find(|key| !table.contains_key(**key)) {
         Some(key) => {
-            let message = format!("[[cable]] has no key {key}: expected from and to");
+            let message = format!("{title} has no key {key}: expected {expected}");
             Err(SegmentError::new(message).at_line(line(text, span)))
         }
         None => Ok(()),

@@ -7,14 +7,18 @@ fn refused(text: &str) -> String {
     Segment::from_toml(text, Path::new("nowhere")).unwrap_err().to_string()
 }
 
+/// The tables of a file, and their keys.
+const TABLES: [(&str, Keys); 4] =
+    [("[segment]", SEGMENT), ("[[device]]", DEVICE), ("[[cable]]", CABLE), ("[[fault]]", FAULT)];
+
 /// Mistakes in a file, and the whole message of each.
 const MISTAKES: &[(&str, &str)] = &[
     // Tables.
     (
         "[devices]\ntype = \"servo\"",
-        "line 1: unknown table or key \"devices\": expected [segment], [[device]] or [[cable]]",
+        "line 1: unknown table or key \"devices\": expected [segment], [[device]], [[cable]] or [[fault]]",
     ),
-    ("ring = true", "line 1: unknown table or key \"ring\": expected [segment], [[device]] or [[cable]]"),
+    ("ring = true", "line 1: unknown table or key \"ring\": expected [segment], [[device]], [[cable]] or [[fault]]"),
     ("[[segment]]\nring = true", "line 1: segment: expected one table [segment], got an array"),
     ("segment = 3", "line 1: segment: expected one table [segment], got 3"),
     ("\n[device]\ntype = \"servo\"", "line 2: device: expected tables [[device]], got a table"),
@@ -33,6 +37,23 @@ const MISTAKES: &[(&str, &str)] = &[
     // Missing keys.
     ("\n[[cable]]\nfrom = \"main\"", "line 2: [[cable]] has no key to: expected from and to"),
     ("[[cable]]\ndelay_ns = 5", "line 1: [[cable]] has no key from: expected from and to"),
+    ("[[fault]]\ncut = 5", "line 1: [[fault]] has no key at_ms: expected at_ms and a fault"),
+    ("[[fault]]\nat_ms = 5", "line 1: [[fault]]: expected one of cut, heal, power_off and power_on"),
+    ("[[fault]]\nat_ms = 5\ncut = 0\nheal = 0", "line 1: [[fault]]: expected one of cut, heal, power_off and power_on"),
+    ("[[fault]]\nat_ms = 5\ncut = 0", "line 3: cut: expected the number of a cable, got 0, and there is none"),
+    (
+        "[[device]]\ntype = \"servo\"\n[[fault]]\nat_ms = 5\nheal = 1",
+        "line 5: heal: expected the number of a cable, 0 to 0, got 1",
+    ),
+    (
+        "[[device]]\ntype = \"servo\"\n[[fault]]\nat_ms = 5\npower_off = \"coupler\"",
+        "line 5: power_off: expected the name of a device, got \"coupler\"",
+    ),
+    (
+        "[[fault]]\nat_ms = 1e12\ncut = 0",
+        "line 2: at_ms: expected at most 31536000000, which is a year, got 1000000000000",
+    ),
+    ("[[fault]]\nat_ms = -5\ncut = 0", "line 2: at_ms: expected a time, not negative, got -5"),
     // Other types.
     ("[segment]\nname = 7", "line 2: name: expected a text in quotation marks, got 7"),
     ("[segment]\nring = 7", "line 2: ring: expected true, false or \"device.port\", got 7"),
@@ -148,7 +169,7 @@ fn text_that_is_no_toml_is_refused_with_its_line_and_without_rust_types() {
 /// The reader refuses an unknown key with its own keys: they are those of the tables here.
 #[test]
 fn the_keys_are_those_of_the_reader() {
-    for (before, keys) in [("[segment]", SEGMENT), ("[[device]]", DEVICE), ("[[cable]]", CABLE)] {
+    for (before, keys) in TABLES {
         let message = crate::segment::format::File::parse(&format!("{before}\nno_such_key = 1")).unwrap_err().message;
         let known: Vec<&str> = message.split('`').skip(3).step_by(2).collect();
         assert_eq!(known, keys.iter().map(|(key, _)| *key).collect::<Vec<_>>(), "{before}: {message}");
@@ -158,7 +179,7 @@ fn the_keys_are_those_of_the_reader() {
 /// Each key takes the largest value of its type: the reader has no narrower one.
 #[test]
 fn the_reader_takes_every_value_that_the_check_lets_pass() {
-    for (before, keys) in [("[segment]", SEGMENT), ("[[device]]", DEVICE), ("[[cable]]", CABLE)] {
+    for (before, keys) in TABLES {
         for (key, kind) in keys {
             let values = match kind {
                 Text => vec!["\"x\"".to_owned()],
@@ -169,8 +190,12 @@ fn the_reader_takes_every_value_that_the_check_lets_pass() {
                 Ring => vec!["false".to_owned(), "\"x.1\"".to_owned()],
             };
             for value in values {
-                let others = CABLE_REQUIRED.iter().filter(|other| before == "[[cable]]" && *other != key);
-                let others: String = others.map(|other| format!("{other} = \"x\"\n")).collect();
+                let required: &[&str] = match before {
+                    "[[cable]]" => &["from = \"x\"\n", "to = \"x\"\n"],
+                    "[[fault]]" => &["at_ms = 1\n"],
+                    _ => &[],
+                };
+                let others: String = required.iter().copied().filter(|other| !other.starts_with(*key)).collect();
                 let text = format!("{before}\n{others}{key} = {value}\n");
                 assert_eq!(check(&text), Ok(()), "{text}");
                 assert!(crate::segment::format::File::parse(&text).is_ok(), "{text}");
@@ -213,11 +238,13 @@ const VALUES: [&str; 17] = [
 #[test]
 fn a_refused_value_of_any_key_is_named_with_line_key_and_what_is_expected() {
     let mut refused = 0;
-    for (header, keys) in [("[segment]", SEGMENT), ("[[device]]", DEVICE), ("[[cable]]", CABLE)] {
+    for (header, keys) in TABLES {
         for ((key, _), value) in keys.iter().flat_map(|key| VALUES.map(|value| (key, value))) {
             let others: &[&str] = match header {
                 "[[cable]]" => &["from = \"b.1\"", "to = \"c.0\""],
                 "[[device]]" => &["type = \"servo\"", "name = \"x\""],
+                "[[fault]]" if *key == "at_ms" => &["cut = 0"],
+                "[[fault]]" => &["at_ms = 1"],
                 _ => &[],
             };
             let others: Vec<&str> = others.iter().copied().filter(|line| !line.starts_with(*key)).collect();
