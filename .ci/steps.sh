@@ -90,7 +90,7 @@ tries() {
         # The runner names at its end what failed.
         mapfile -t names < <(sed -n '/^failures:$/,/^test result/s/^    \([a-z0-9_:]*\)$/\1/p' "$logs/try" | sort -u)
         echo "try $try of 3 did not hold: ${names[*]:-nothing was run}"
-        printf "${program##*/} %s\n" "${names[@]}" >>"$logs/did-not-hold"
+        printf "${program##*/} %s\n" "${names[@]}" >>"$logs/failed-first"
         [[ ${#names[@]} != 0 ]] || return 1
         names=(--exact "${names[@]}")
     done
@@ -98,18 +98,18 @@ tries() {
     return 1
 }
 
-# did_not_hold: the tests that needed another try, at the end of the run, with the number of tries that did not hold.
-did_not_hold() {
-    if [[ ! -s $logs/did-not-hold ]]; then
-        echo "no test needed a second try"
+# failed_first: prints the tests that failed at first and passed in another try, with the number of failures.
+failed_first() {
+    if [[ ! -s $logs/failed-first ]]; then
+        echo "each test passed in its first try"
         return
     fi
-    echo "tests that did not hold at once (tries that did not hold, program, test):"
-    sort "$logs/did-not-hold" | uniq -c
+    echo "tests that passed only in another try (failures, program, test):"
+    sort "$logs/failed-first" | uniq -c
 }
 
-# All phases of a cycle and all cables of rings of 4, 10 and 33 that are cut and repaired, and a million undisturbed
-# cycles, of which `cargo test` takes a share.
+# Cuts and repairs of all cables of rings of 4, 10 and 33 in all phases of a cycle, and a million undisturbed cycles;
+# `cargo test` runs a part of them.
 lossless() {
     local programs program directory
     mapfile -t programs < <(test_programs virtual_time)

@@ -1,4 +1,4 @@
-//! `packaging/install`: which files come where, what stays of an edited configuration, what is left after its removal.
+//! `packaging/install`: the places of its files, edited configuration files, and what a removal leaves.
 
 use std::collections::BTreeSet;
 use std::os::unix::fs::MetadataExt;
@@ -11,7 +11,7 @@ fn script() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../packaging/install")
 }
 
-/// The root of a package, and programs to install there: scripts in place of those that a release has.
+/// The root directory of a package, and programs to install there, in place of those of a release.
 struct Root {
     directory: PathBuf,
 }
@@ -207,7 +207,7 @@ fn an_edited_configuration_outlives_a_new_version_and_a_removal_but_no_purge() {
         assert_eq!((root.text(conf), root.path(new).exists()), (edited.clone(), true));
     }
     let about = said(&root.run(&["--prefix", "/usr", "--uninstall"]), true);
-    assert!(about.contains("edited files that are left: 1"), "{about}");
+    assert!(about.contains("edited files that were kept: 1"), "{about}");
     let left = ["/etc/ethercat.conf", "/usr/share/ringcat/installed"].map(String::from);
     assert_eq!((root.files(), root.text(conf)), (BTreeSet::from(left), edited.clone()));
     // As an application that comes back after its removal.
@@ -291,9 +291,9 @@ fn files_of_a_package_are_neither_replaced_nor_removed() {
     let programs = root.directory.join("programs");
     let programs = ["--programs", programs.to_str().expect("text"), "--without-library", "--prefix", "/usr"];
     let about = said(&root.run(&programs), false);
-    assert!(about.contains("/usr/bin/ethercat is of a package") && root.files() == all, "{about}");
+    assert!(about.contains("/usr/bin/ethercat belongs to a package") && root.files() == all, "{about}");
     let about = root.install(&["--prefix", "/usr/local"]);
-    assert!(about.contains("kept, because it is of a package"), "{about}");
+    assert!(about.contains("kept, because it belongs to a package"), "{about}");
     said(&root.run(&["--prefix", "/usr/local", "--uninstall", "--purge"]), true);
     let left: BTreeSet<String> = root.files().into_iter().filter(|file| !file.starts_with("/var/lib/dpkg")).collect();
     assert_eq!((left, root.text(conf)), (BTreeSet::from([conf, tool].map(String::from)), before));
