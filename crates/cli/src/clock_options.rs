@@ -226,7 +226,7 @@ mod tests {
 
     // covers: dc-tools
     #[test]
-    fn clocks_in_front_of_the_reference_are_warned_of() {
+    fn clocks_upstream_of_the_reference_are_warned_of() {
         let mut found = vec![SubDeviceInfo::default(); 3];
         found[1].controller.features.dc = true;
         let mut declaration = ringcat::automatic(&found, std::time::Duration::from_millis(1));

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{ArgGroup, Args};
 use ringcat::SubDeviceInfo;
-use ringcat::config::{Configuration, FoundNetwork, ObjectNames, Stated};
+use ringcat::config::{Configuration, FoundNetwork, ObjectNames, StatedProperties};
 use ringcat::eni::EniFile;
 use ringcat::network::LoadedNetwork;
 
@@ -49,7 +49,7 @@ pub struct CompareArguments {
 /// What the file declares.
 struct Declared {
     configuration: Configuration,
-    stated: Vec<Stated>,
+    stated: Vec<StatedProperties>,
     /// Names of objects, by SubDevice.
     names: Vec<ObjectNames>,
 }
@@ -127,7 +127,7 @@ fn print(differences: &[ringcat::eni::Difference]) {
 /// What is to be read of a found SubDevice with this index in the file.
 fn wanted(
     configuration: &Configuration,
-    stated: &[Stated],
+    stated: &[StatedProperties],
     descriptions: Option<&mut Descriptions>,
     (info, config): (&SubDeviceInfo, Option<usize>),
 ) -> Wanted {
@@ -160,7 +160,7 @@ fn report_unlisted(bus: &Bus, configuration: &Configuration, counterparts: &[Opt
 
 /// Marks the declarations of SubDevices that have modules on the bus, or slots in their descriptions.
 fn mark_modular(
-    stated: &mut [Stated],
+    stated: &mut [StatedProperties],
     bus: &Bus,
     counterparts: &[Option<usize>],
     mut descriptions: Option<&mut Descriptions>,

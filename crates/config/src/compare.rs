@@ -35,7 +35,7 @@ use ringcat_wire::address::Position;
 use crate::configuration::Configuration;
 use align::Place;
 
-pub use difference::{Difference, DifferenceKind, FoundNetwork, Stated, StatedSyncManager};
+pub use difference::{Difference, DifferenceKind, FoundNetwork, StatedProperties, StatedSyncManager};
 #[cfg(feature = "network")]
 pub(crate) use properties::ports;
 
@@ -98,9 +98,9 @@ impl Configuration {
 
     /// Every difference between the network of a scan and the file: SubDevices that are missing, additional or at
     /// another place, several with one alias or identification, revision, serial number, PDOs, modules, mailboxes,
-    /// SyncManagers, ports, cables, clocks, rings. `stated` are the [`Stated`] properties by the index of the
+    /// SyncManagers, ports, cables, clocks, rings. `stated` are the [`StatedProperties`] by the index of the
     /// SubDevice; it may be empty.
-    pub fn differences(&self, network: FoundNetwork<'_>, stated: &[Stated]) -> Vec<Difference> {
+    pub fn differences(&self, network: FoundNetwork<'_>, stated: &[StatedProperties]) -> Vec<Difference> {
         let FoundNetwork { subdevices: found, topology, firmware, modules, .. } = network;
         let names = self.names();
         let mut differences = Vec::new();

@@ -21,7 +21,7 @@ mod object_names;
 mod pdo_list;
 mod xml;
 
-pub use compare::{Difference, DifferenceKind, FoundNetwork, Stated, StatedSyncManager};
+pub use compare::{Difference, DifferenceKind, FoundNetwork, StatedProperties, StatedSyncManager};
 pub use configuration::{
     Configuration, DeclaredRings, ImageArea, ImageCopy, Notice, ProcessImage, SubDeviceFacts, Variable,
 };

@@ -209,7 +209,7 @@ pub enum Query {
         /// The IDN.
         idn: u16,
     },
-    /// Queries of the command line tool, and of clients that want the same.
+    /// Queries of the command line tool, and of clients that need the same.
     Tool(ToolQuery),
 }
 

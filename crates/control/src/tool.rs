@@ -17,9 +17,9 @@ pub use lines::{
 /// Most SubDevices in one answer to [`ToolQuery::SubDevices`] and [`ToolQuery::Ports`].
 pub const MOST_SUBDEVICES: usize = 512;
 /// Most SubDevices in one [`ToolQuery::SiiImages`].
-pub const MOST_IMAGES: usize = 64;
+pub const MAX_IMAGES: usize = 64;
 /// Most transfers in one answer to [`ToolQuery::Transfers`].
-pub const MOST_TRANSFERS: usize = 16;
+pub const MAX_TRANSFERS: usize = 16;
 /// Most declared SubDevices in one answer to [`ToolQuery::Declared`].
 pub const MOST_DECLARED: usize = 64;
 /// Most bytes of a part of a file, in [`ToolQuery::FilePart`].
@@ -98,7 +98,7 @@ pub enum ToolQuery {
     },
     /// Reads whole SIIs. One that has proved to be unchanged since it was read is not read again.
     SiiImages {
-        /// Positions of the SubDevices, at most [`MOST_IMAGES`].
+        /// Positions of the SubDevices, at most [`MAX_IMAGES`].
         positions: Vec<u16>,
     },
     /// Progress of the long transfers of a SubDevice. Sends no frame.
@@ -213,7 +213,7 @@ pub enum ToolAnswer {
     /// To [`ToolQuery::SiiImages`], in the order of the positions. The bytes of the message are the images, one behind
     /// the other.
     SiiImages(Vec<SiiLine>),
-    /// To [`ToolQuery::Transfers`], the oldest first, at most [`MOST_TRANSFERS`].
+    /// To [`ToolQuery::Transfers`], the oldest first, at most [`MAX_TRANSFERS`].
     Transfers(Vec<TransferLine>),
     /// To [`ToolQuery::Ethernet`].
     Ethernet(Vec<EthernetLine>),

@@ -33,6 +33,7 @@ mod place;
 mod presence;
 mod proved;
 mod ready;
+mod round_trip;
 mod send_service;
 mod service;
 mod shares;
@@ -44,7 +45,6 @@ mod standby;
 mod template;
 mod tries;
 mod usual;
-mod way;
 mod words;
 
 use alloc::sync::Arc;
@@ -141,7 +141,7 @@ pub struct Exchange {
     next_at: Instant,
     /// Shortest period of a domain that has one.
     base_ns: u64,
-    /// The ring is closed, as far as the ways of frames are concerned.
+    /// The ring is closed, as far as round trips are concerned.
     is_closed: bool,
     /// MainDevice redundancy.
     standby: Standby,

@@ -18,7 +18,6 @@ extern crate alloc;
 #[cfg(test)]
 extern crate std;
 
-mod bell;
 pub(crate) mod board;
 pub(crate) mod clocks;
 pub mod config;
@@ -39,6 +38,7 @@ pub(crate) mod plan;
 pub(crate) mod procedures;
 pub(crate) mod queue;
 pub mod request;
+mod request_counter;
 pub(crate) mod ring;
 pub mod ring_status;
 pub mod role;

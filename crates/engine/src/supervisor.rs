@@ -10,8 +10,6 @@ mod command_reports;
 mod counters;
 mod debug_message;
 mod executor;
-mod flight;
-mod flights;
 mod group;
 pub(crate) mod long_transfers;
 pub(crate) mod memory_writes;
@@ -20,6 +18,8 @@ mod posted;
 mod received;
 mod reply;
 mod round_trip;
+mod sent_frame;
+mod sent_frames;
 mod shared;
 mod shared_cell;
 mod signal;
@@ -48,10 +48,10 @@ pub use received::Received;
 pub use reply::{BusError, Reply};
 pub use signal::Signal;
 
-use crate::bell::Bell;
 use crate::board::Board;
 use crate::event::{Event, EventLog, EventsSince, TimedEvent};
 use crate::link::{Link, LinkOrder, LinkSet};
+use crate::request_counter::RequestCounter;
 use crate::ring::{Class, Classified, Identity, RingMonitor, RingState, Sequence};
 use crate::role::{MainDeviceRole, RoleControl};
 use crate::time::Instant;
@@ -83,13 +83,13 @@ impl Supervisor {
 
     /// Sequence number of the last frame.
     pub(crate) fn sequence(&self) -> Sequence {
-        self.shared.borrow().flights.sequence()
+        self.shared.borrow().sent_frames.sequence()
     }
 
     /// Goes on with the sequence numbers of another supervisor, before the first frame: a frame of that one that comes
     /// back late is none of this one.
     pub(crate) fn go_on_from(&mut self, sequence: Sequence) {
-        self.shared.borrow_mut().flights.go_on_from(sequence);
+        self.shared.borrow_mut().sent_frames.go_on_from(sequence);
     }
 
     /// Goes on with the state of the ring that another process has known, before the first frame.
@@ -100,7 +100,7 @@ impl Supervisor {
     /// Number of a frame that is sent beside those of procedures.
     #[cfg(feature = "standby")]
     pub(crate) fn take_sequence(&mut self) -> Sequence {
-        self.shared.borrow_mut().flights.take_sequence()
+        self.shared.borrow_mut().sent_frames.take_sequence()
     }
 
     /// Sets when there is work beside procedures: at a time, and whether a frame is to be sent now.
@@ -119,8 +119,8 @@ impl Supervisor {
     }
 
     /// Attaches the request counter of cyclic threads: procedures wake when it changes.
-    pub(crate) fn attach_bell(&mut self, bell: Bell) {
-        self.shared.borrow_mut().bell = bell;
+    pub(crate) fn attach_request_counter(&mut self, request_counter: RequestCounter) {
+        self.shared.borrow_mut().request_counter = request_counter;
     }
 
     /// Attaches the role of the MainDevice: as INACTIVE nothing is sent.
@@ -185,7 +185,7 @@ impl Supervisor {
         {
             let shared = &mut *self.shared.borrow_mut();
             shared.now = now;
-            shared.expire_flights();
+            shared.expire_sent_frames();
             shared.expire_alone();
             shared.fire_timers();
             shared.wake_watchers();

@@ -88,7 +88,7 @@ fn try_run(words: &[OsString], socket: &Path, output: &mut dyn Write, errors: &m
     }
     let without_json = match command.output {
         Output::Data => None,
-        Output::Table => Some("is for people"),
+        Output::Table => Some("only prints a table"),
         Output::Nothing => Some("prints no data"),
     };
     if let (true, Some(why)) = (arguments.json, without_json) {

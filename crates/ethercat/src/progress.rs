@@ -42,22 +42,22 @@ pub fn is_shown() -> bool {
 pub struct Bar<'a> {
     name: &'static str,
     transfer: Transfer,
-    /// Of the daemon, until a connection was tried.
+    /// Socket of the daemon, until the second connection was tried.
     socket: Option<&'a Path>,
-    looker: &'a mut Option<Client>,
+    second: &'a mut Option<Client>,
     is_drawn: bool,
 }
 
 impl<'a> Bar<'a> {
-    /// That of a command; `looker` is the connection for progress requests. Where there is none yet, the first request
+    /// The bar of a command; `second` is the connection for progress requests. If there is none yet, the first request
     /// connects it to `socket`, if given.
     pub fn new(
         name: &'static str,
         transfer: Transfer,
         socket: Option<&'a Path>,
-        looker: &'a mut Option<Client>,
+        second: &'a mut Option<Client>,
     ) -> Bar<'a> {
-        Bar { name, transfer, socket, looker, is_drawn: false }
+        Bar { name, transfer, socket, second, is_drawn: false }
     }
 
     /// Shows the progress of the transfer.
@@ -82,15 +82,15 @@ impl<'a> Bar<'a> {
     fn look(&mut self) -> Option<TransferLine> {
         let Transfer { master, position, work } = self.transfer;
         // The daemon may accept no more clients: there is no bar.
-        if let (None, Some(socket)) = (&self.looker, self.socket.take()) {
-            *self.looker = Client::connect(socket, "ethercat").ok();
+        if let (None, Some(socket)) = (&self.second, self.socket.take()) {
+            *self.second = Client::connect(socket, "ethercat").ok();
         }
-        let ask = Query::Tool(ToolQuery::Transfers { position });
-        match self.looker.as_mut()?.ask(master, ask, Vec::new()) {
+        let query = Query::Tool(ToolQuery::Transfers { position });
+        match self.second.as_mut()?.ask(master, query, Vec::new()) {
             Ok((Answer::Tool(ToolAnswer::Transfers(lines)), _)) => lines.into_iter().find(|line| line.work == work),
             // The answer to the command contains the reason. Another request could wait as long as this one.
             _ => {
-                *self.looker = None;
+                *self.second = None;
                 None
             }
         }
@@ -115,7 +115,7 @@ mod tests {
 
     // covers: daemon
     #[test]
-    fn a_bar_shows_a_share_where_the_whole_is_known() {
+    fn a_bar_shows_a_share_if_the_total_is_known() {
         let line = |done, total| TransferLine { work: TransferWork::SiiWrite, done, total };
         let wanted = "sii_write  [###############---------------]  50 %  1024/2048 bytes";
         assert_eq!(text("sii_write", &line(1024, Some(2048))), wanted);

@@ -64,7 +64,7 @@ pub struct Started {
     /// The connection to it.
     pub client: Client,
     /// Another one, where bars are shown.
-    pub looker: Option<Client>,
+    pub second: Option<Client>,
 }
 
 /// The links that the options name, as the option of the daemon; `None` without such an option.
@@ -119,12 +119,12 @@ impl Standalone {
         let standard_error = listen_to(daemon.stderr.take());
         let mut standalone = Standalone { daemon, standard_error };
         let mut client = standalone.connect(&socket, begin)?;
-        let looker = progress::is_shown().then(|| Client::connect(&socket, "ethercat").ok()).flatten();
+        let second = progress::is_shown().then(|| Client::connect(&socket, "ethercat").ok()).flatten();
         // The connections are enough: nothing is left where the command is ended by a signal.
         drop(directory);
         check(&mut client)?;
         settle(&mut client, begin)?;
-        Ok(Started { standalone, client, looker })
+        Ok(Started { standalone, client, second })
     }
 
     /// Waits until the daemon answers.

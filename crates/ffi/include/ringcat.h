@@ -80,18 +80,18 @@ EC_PUBLIC_API int ringcat_master_variable(ec_master_t *master, const char *name,
 
 /*
  * Lost frames of a domain are sent again within their cycle (1), or not (0, as without this call). The key of a network
- * file is `send_again`. The second try must be back before the next ecrt_master_send(), which is expected after the time
- * of ecrt_master_set_send_interval(); without it after the shortest period of the network file, or 1 ms.
+ * file is `send_again`. The second try must be back before the next ecrt_master_send(), which is expected after the
+ * time of ecrt_master_set_send_interval(); without it after the shortest period of the network file, or 1 ms.
  *
  * Returns 0, or -EBUSY: the master is active; -EINVAL: the handle has ended or is NULL.
  */
 EC_PUBLIC_API int ringcat_domain_send_again(ec_domain_t *domain, int on);
 
 /*
- * The time at which ecrt_master_receive() has to be called again, so that a frame that is lost by then is sent again: in
- * nanoseconds of CLOCK_MONOTONIC, UINT64_MAX if no frame is on the wire. A cycle then is: send; receive when frames
- * usually are back; receive at this time, as long as it is before the next cycle; receive, process, queue. May be called
- * by a real-time thread.
+ * The time at which ecrt_master_receive() has to be called again, so that a frame that is lost by then is sent again:
+ * in nanoseconds of CLOCK_MONOTONIC, UINT64_MAX if no frame is on the wire. A cycle then is: send; receive when frames
+ * usually are back; receive at this time, as long as it is before the next cycle; receive, process, queue. A real-time
+ * thread may call it.
  *
  * Returns 0, or -EPERM: not reserved; -EBUSY: another thread makes a cyclic call; -EFAULT: time_ns is NULL; -ENODEV:
  * the daemon has taken the bus back; -EINVAL: the handle has ended or is NULL.

@@ -11,7 +11,7 @@ use ringcat::{Application, Instant, SupervisorThread};
 use crate::any_links::AnyLinks;
 use crate::code::{Code, Outcome};
 
-/// No frame is waited for as long as this.
+/// Longer than the wait for any frame.
 const LONGEST_WAIT: Duration = Duration::from_secs(10);
 
 /// The application of a handle.
@@ -125,7 +125,7 @@ impl Active {
     pub fn receive_again_in(&self) -> Option<Duration> {
         let at = self.application.receive_again_at();
         let rest = (at != Instant::NEVER).then(|| at.since(self.application.now()));
-        // Before the ways of frames are known the time is far away.
+        // Before round trips are known the time is far in the future.
         rest.filter(|rest| *rest < LONGEST_WAIT)
     }
 

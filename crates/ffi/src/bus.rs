@@ -2,7 +2,7 @@
 //!
 //! A bus has its links and the thread of the acyclic half, which scans and keeps all SubDevices in PREOP while no
 //! application is active. One handle reserves it. Where a daemon answers, it comes from there when a handle reserves
-//! it, and goes back with that handle; others ask the daemon ([`crate::responder`]).
+//! it, and goes back with that handle; others send queries to the daemon ([`crate::responder`]).
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,4 +1,4 @@
-//! What any thread reads of the active application, and what it requests, in atomic words: no allocation, no waiting.
+//! Atomic words with which any thread reads the active application and sends it requests: no allocation, no waiting.
 
 use std::sync::RwLock;
 

@@ -1,6 +1,6 @@
 //! One handle of a master: reservation, activation, the way back.
 //!
-//! A handle that only opened the master may ask for information and use mailboxes, beside the one that reserved it. The
+//! A handle that only opened the master may request information and use mailboxes, beside the one that reserved it. The
 //! application exists between activation and deactivation; cyclic calls use it by a claim that never waits.
 
 mod activation;
@@ -42,7 +42,7 @@ enum Access {
     Released,
 }
 
-/// A way to ask the daemon that has this master. `None` if variables name links instead, or no variable names the
+/// A connection to the daemon that has this master. `None` if variables name links instead, or no variable names the
 /// daemon and none answers.
 ///
 /// # Errors
@@ -77,7 +77,7 @@ pub struct Master {
 }
 
 impl Master {
-    /// Opens a master: a way to ask the daemon that has it, or the links that variables name.
+    /// Opens a master: a connection to the daemon that has it, or the links that variables name.
     ///
     /// # Errors
     /// What is wrong, for the operator.
@@ -383,7 +383,7 @@ impl Master {
         self.live.read(lost, read)
     }
 
-    /// What is seen of all SubDevices: words while the application of this handle is active, otherwise an answer.
+    /// State of all SubDevices: from words while the application of this handle is active, otherwise from an answer.
     ///
     /// # Errors
     /// As [`Master::live`] and [`Master::responder`]; the answer does not come.
@@ -394,7 +394,7 @@ impl Master {
         self.live(None, |live| Some(live.overview()))?.ok_or(Code::GONE)
     }
 
-    /// Repeats failed configurations. While the application is active the acyclic half only gets a word.
+    /// Repeats failed configurations. While the application is active, this only sets a word for the acyclic half.
     ///
     /// # Errors
     /// The handle has not reserved the bus; as [`Master::live`]; the acyclic half has ended.

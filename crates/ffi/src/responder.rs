@@ -28,7 +28,7 @@ pub enum Responder {
 pub struct DaemonResponder {
     socket: PathBuf,
     master: u32,
-    /// Connections that no question uses: several threads may ask at once.
+    /// Unused connections: several threads may send queries at once.
     idle: Mutex<Vec<Client>>,
 }
 

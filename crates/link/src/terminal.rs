@@ -99,7 +99,7 @@ mod tests {
 
     // covers: daemon
     #[test]
-    fn what_is_no_terminal_has_no_size() {
+    fn only_a_terminal_has_a_size() {
         let (near, _far) = UnixStream::pair().expect("a pair");
         assert_eq!(size(near.as_fd()), None);
     }

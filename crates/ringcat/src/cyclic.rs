@@ -468,7 +468,7 @@ impl Cyclic {
         }
     }
 
-    /// Publishes what changes only in disturbed cycles, and carries out what readers want.
+    /// Publishes what changes only in disturbed cycles, and carries out requests of readers.
     #[cold]
     fn publish_rest(&mut self, disturbances: u64) {
         self.published = disturbances;

@@ -41,7 +41,7 @@ pub struct CyclicStatus {
     phase: AtomicU64,
     /// Spread of the clocks plus one; zero before it was read.
     spread: AtomicU64,
-    /// What readers want, a bit each.
+    /// Requests of readers, a bit each.
     wanted: AtomicU8,
     /// Source address of the last frame of another MainDevice, and the link it arrived on, plus one.
     foreign: AtomicU64,

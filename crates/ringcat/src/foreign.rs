@@ -11,10 +11,10 @@ use ringcat_wire::frame::{ETHERNET_HEADER_LEN, MacAddress};
 
 use crate::text::address;
 
-mod listened;
+mod listening;
 mod quiet;
 
-pub use listened::{Listened, ListenedPhase, ListeningSockets};
+pub use listening::{ListeningPhase, ListeningSockets, ListeningState};
 pub use quiet::QuietLinks;
 
 /// How long frames are to be listened for: longer than the cycle of all but the slowest MainDevices.

@@ -39,7 +39,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use ringcat_config::network::{MAX_NETWORK_BYTES, NetworkError};
-use ringcat_config::{Configuration, Export, ExportOptions, Stated};
+use ringcat_config::{Configuration, Export, ExportOptions, StatedProperties};
 use ringcat_engine::main_device::Declaration;
 
 use crate::regular_file::read_at_most;
@@ -142,7 +142,7 @@ impl LoadedNetwork {
     }
 
     /// What the file states of each SubDevice besides the declaration, to compare it with a network.
-    pub fn stated(&self) -> Vec<Stated> {
+    pub fn stated(&self) -> Vec<StatedProperties> {
         self.file.stated()
     }
 }

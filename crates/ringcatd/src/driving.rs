@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use ringcat::daemon::{BusLog, Followed, Lines, adopt_links, serving};
 use ringcat::eoe::{Ethernet, EthernetEvent, EthernetOptions};
-use ringcat::foreign::{Listened, ListenedPhase, QuietLinks};
+use ringcat::foreign::{ListeningPhase, ListeningState, QuietLinks};
 use ringcat::{
     Activity, AlState, Error, Handover, Knowledge, Links, LogFilter, LogLevel, Options, Retries, Services, Snapshot,
     StateScope, SupervisorThread,
@@ -42,7 +42,7 @@ pub struct Lasting<'a> {
     /// Network interfaces of EoE; `None`: there are none.
     pub interfaces: Option<Arc<EthernetInterfaces>>,
     /// Frames received on the links: nothing is sent before.
-    pub listened: Arc<Listened>,
+    pub listened: Arc<ListeningState>,
 }
 
 /// The daemon drives a master.
@@ -50,7 +50,7 @@ pub struct Lasting<'a> {
 pub struct Driving {
     supervisor: SupervisorThread,
     log: BusLog,
-    listened: Arc<Listened>,
+    listened: Arc<ListeningState>,
     /// Moves frames of EoE.
     ethernet: Option<Ethernet>,
 }
@@ -108,7 +108,7 @@ impl Driving {
     /// Ends it without a further frame. What is known of the segment; empty if nothing is.
     pub fn hand_over(self) -> Vec<u8> {
         let Driving { supervisor, log, listened, ethernet: _ethernet } = self;
-        if listened.phase() == ListenedPhase::Free {
+        if listened.phase() == ListeningPhase::Free {
             wait_for_first_scan(&supervisor);
         }
         wait_for_scan(&supervisor);

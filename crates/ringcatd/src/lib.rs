@@ -11,7 +11,7 @@
 //! * [`ethernet`]: network interfaces of EoE, which outlast applications;
 //! * [`owner`]: queries to an application that drives a master; [`tenure`]: its time, and what ends it;
 //!   [`process_state`]: what the kernel shows of its process; [`owner_lock`]: what of it outlives the daemon;
-//! * [`listening`], [`session`], [`rights`]: clients, what they ask, what they may;
+//! * [`listening`], [`session`], [`rights`]: clients, their requests and permissions;
 //! * [`daemon`]: all of it; [`running`]: from its start to its end; [`service_manager`]: messages to that; [`log`]:
 //!   lines for the operator.
 //!

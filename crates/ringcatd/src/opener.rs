@@ -2,7 +2,7 @@
 //!
 //! The daemon starts its own program again, with a Unix socket as standard input, before it gives up its capabilities.
 //! A question is the number of links; the answer is a set of sockets with rings and filters that have no interface yet,
-//! or what is wrong. The process ends with the daemon. It reads nothing else, and no other process can ask it.
+//! or what is wrong. The process ends with the daemon. It reads nothing else, and no other process reaches it.
 
 use std::io::{self, Read, Write};
 use std::os::fd::{AsFd, AsRawFd, OwnedFd};

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use ringcat::foreign::{Listened, ListenedPhase};
+use ringcat::foreign::{ListeningPhase, ListeningState};
 use ringcat_control::Refusal;
 
 use crate::log::say;
@@ -16,7 +16,7 @@ const LISTENED: Duration = Duration::from_secs(1);
 #[derive(Debug)]
 pub struct Others {
     master: u32,
-    listened: Arc<Listened>,
+    listened: Arc<ListeningState>,
     /// One was reported to the operator.
     is_reported: AtomicBool,
 }
@@ -24,12 +24,12 @@ pub struct Others {
 impl Others {
     /// No other MainDevice is known. A segment that is not shared has none.
     pub fn new(master: u32, is_shared: bool) -> Others {
-        let listened = Arc::new(if is_shared { Listened::default() } else { Listened::not_shared() });
+        let listened = Arc::new(if is_shared { ListeningState::default() } else { ListeningState::not_shared() });
         Others { master, listened, is_reported: AtomicBool::new(false) }
     }
 
     /// For links that listen.
-    pub fn listened(&self) -> Arc<Listened> {
+    pub fn listened(&self) -> Arc<ListeningState> {
         self.listened.clone()
     }
 
@@ -54,7 +54,7 @@ impl Others {
         let master = self.master;
         match self.cause() {
             Some(cause) => Err(Refusal::Fault { master, cause }),
-            None if self.listened.phase() == ListenedPhase::Listening => Err(Refusal::Changing { master }),
+            None if self.listened.phase() == ListeningPhase::Listening => Err(Refusal::Changing { master }),
             None => Ok(()),
         }
     }

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use ringcat::config::network::Bytes;
 use ringcat::config::network::model::{Clocks, Required, Sdo, Startup, SyncManager};
-use ringcat::config::{Configuration, Difference, ExportOptions, FoundNetwork, Stated};
+use ringcat::config::{Configuration, Difference, ExportOptions, FoundNetwork, StatedProperties};
 use ringcat::eni::EniFile;
 use ringcat::esi::EsiDevices;
 use ringcat::network::{LoadedNetwork, NetworkFile, ScanOptions};
@@ -113,7 +113,7 @@ fn change(units: &mut Vec<Unit>, dice: &mut Dice) {
 /// Checks the marks of a file on a bus.
 fn check(
     configuration: &Configuration,
-    stated: &[Stated],
+    stated: &[StatedProperties],
     declaration: Declaration,
     bus: &[Unit],
 ) -> Result<(), String> {

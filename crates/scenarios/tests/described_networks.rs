@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use ringcat::config::network::model::SubDevice;
-use ringcat::config::{Configuration, Difference, ExportOptions, FoundNetwork, Stated, esi};
+use ringcat::config::{Configuration, Difference, ExportOptions, FoundNetwork, StatedProperties, esi};
 use ringcat::eni::EniFile;
 use ringcat::esi::{EsiDevices, load};
 use ringcat::network::{LoadedNetwork, NetworkFile, ScanOptions};
@@ -37,7 +37,7 @@ fn scan_of(text: &str, folder: &Path, devices: &EsiDevices) -> Result<Scan, Stri
     MainDevice::request(links, &Options::default()).scan().map_err(|error| error.to_string())
 }
 
-fn differences(configuration: &Configuration, stated: &[Stated], scan: &Scan) -> Result<(), String> {
+fn differences(configuration: &Configuration, stated: &[StatedProperties], scan: &Scan) -> Result<(), String> {
     let found = FoundNetwork::new(&scan.subdevices, &scan.topology);
     let found: Vec<Difference> = configuration.differences(found, stated);
     let texts: Vec<&str> = found.iter().map(|it| it.text.as_str()).collect();

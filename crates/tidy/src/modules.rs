@@ -25,8 +25,8 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("direction", &[]),
     ("domain", &[]),
     ("declared", &[]),
-    ("bell", &[]),
-    ("request", &["declared", "bell"]),
+    ("request_counter", &[]),
+    ("request", &["declared", "request_counter"]),
     ("junction", &["declared"]),
     ("role", &[]),
     // frames
@@ -52,15 +52,15 @@ pub const ENGINE: &[(&str, &[&str])] = &[
     ("exchange", &["order", "direction", "declared", "time", "link", "queue", "domain", "role", "ring", "board",
         "clocks", "layout", "event"]),
     // acyclic half
-    ("supervisor", &["time", "bell", "link", "queue", "ring", "board", "event", "role"]),
+    ("supervisor", &["time", "request_counter", "link", "queue", "ring", "board", "event", "role"]),
     ("mail", &["declared", "time", "info", "config", "event", "knowledge", "supervisor", "role"]),
-    ("procedures", &["order", "declared", "domain", "time", "bell", "link", "queue", "ring", "board", "info",
+    ("procedures", &["order", "declared", "domain", "time", "request_counter", "link", "queue", "ring", "board", "info",
         "topology", "ring_status", "config", "clocks", "plan", "layout", "event", "knowledge", "segment",
         "supervisor", "mail", "request", "junction", "role"]),
     // both together
-    ("main_device", &["order", "declared", "direction", "time", "bell", "link", "queue", "domain", "ring", "board",
-        "info", "topology", "ring_status", "config", "plan", "layout", "event", "knowledge", "segment", "exchange",
-        "supervisor", "mail", "request", "junction", "role", "procedures", "standby"]),
+    ("main_device", &["order", "declared", "direction", "time", "request_counter", "link", "queue", "domain", "ring",
+        "board", "info", "topology", "ring_status", "config", "plan", "layout", "event", "knowledge", "segment",
+        "exchange", "supervisor", "mail", "request", "junction", "role", "procedures", "standby"]),
 ];
 
 /// The engine's sources.

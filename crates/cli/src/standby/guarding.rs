@@ -38,7 +38,7 @@ pub struct GuardArguments {
     priority: Option<i32>,
 }
 
-/// Guards until the process that has started this one releases it, dies or hangs.
+/// Guards until the process that has started this one releases it, ends or hangs.
 pub fn run(arguments: &GuardArguments) -> ExitCode {
     // Signals that end the program do not end the guard; the program ends it.
     HeldSignals::hold();

@@ -6,7 +6,7 @@ use ringcat_engine::config::{ConfigAddress, Resolution, SubDeviceConfig, SubDevi
 use ringcat_engine::info::SubDeviceInfo;
 
 use super::alike::{Alike, DeviceKey, device, is_device, keys_of};
-use super::difference::Stated;
+use super::difference::StatedProperties;
 use super::moves::moves;
 use crate::configuration::Configuration;
 
@@ -40,7 +40,7 @@ pub(super) enum Place {
 }
 
 /// Pairs all SubDevices, in the order of the file, the additional ones at their places on the bus.
-pub(super) fn align(configuration: &Configuration, found: &[SubDeviceInfo], stated: &[Stated]) -> Vec<Place> {
+pub(super) fn align(configuration: &Configuration, found: &[SubDeviceInfo], stated: &[StatedProperties]) -> Vec<Place> {
     let configs = &configuration.declaration.subdevices;
     let mut info_of: Vec<Option<usize>> = vec![None; configs.len()];
     let mut moved = vec![false; configs.len()];
@@ -220,7 +220,7 @@ pub(super) fn position(config: &SubDeviceConfig) -> usize {
 /// uses none of them; here the first one that is the declared device is compared.
 fn by_mark(
     configs: &[SubDeviceConfig],
-    (found, stated): (&[SubDeviceInfo], &[Stated]),
+    (found, stated): (&[SubDeviceInfo], &[StatedProperties]),
     info_of: &mut [Option<usize>],
     taken: &mut [bool],
 ) {
@@ -241,7 +241,7 @@ fn by_mark(
 
 /// The pairs of an activation that refuses no declaration, in a file with optional SubDevices: the engine decides which
 /// of two SubDevices of one type is absent. Empty if the engine would take another device than the file states.
-fn activated(configs: &[SubDeviceConfig], found: &[SubDeviceInfo], stated: &[Stated]) -> Vec<(usize, usize)> {
+fn activated(configs: &[SubDeviceConfig], found: &[SubDeviceInfo], stated: &[StatedProperties]) -> Vec<(usize, usize)> {
     if configs.iter().all(|config| !config.optional) {
         return Vec::new();
     }

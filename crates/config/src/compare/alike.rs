@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use ringcat_engine::config::SubDeviceConfig;
 use ringcat_engine::info::SubDeviceInfo;
 
-use super::difference::Stated;
+use super::difference::StatedProperties;
 
 /// Degree of a SubDevice that has all that the file demands. It is more than any sum of [`SAME_DEVICE`] and
 /// [`MANDATORY`]: a sequence has at most 4,096 pairs.
@@ -23,7 +23,7 @@ type Unit = (u32, u32, u32);
 pub(super) struct Alike<'a> {
     configs: &'a [SubDeviceConfig],
     found: &'a [SubDeviceInfo],
-    stated: &'a [Stated],
+    stated: &'a [StatedProperties],
     /// The first found SubDevice of each unit that the file demands.
     found_units: BTreeMap<Unit, usize>,
     /// The units that the file demands, with their declarations.
@@ -33,7 +33,11 @@ pub(super) struct Alike<'a> {
 }
 
 impl<'a> Alike<'a> {
-    pub(super) fn new(configs: &'a [SubDeviceConfig], found: &'a [SubDeviceInfo], stated: &'a [Stated]) -> Alike<'a> {
+    pub(super) fn new(
+        configs: &'a [SubDeviceConfig],
+        found: &'a [SubDeviceInfo],
+        stated: &'a [StatedProperties],
+    ) -> Alike<'a> {
         let declared =
             (0..configs.len()).filter_map(|config| Some((unit(&configs[config], stated.get(config))?, config)));
         let declared_units: BTreeMap<Unit, usize> = declared.collect();
@@ -82,7 +86,7 @@ impl<'a> Alike<'a> {
     }
 }
 
-fn unit(declared: &SubDeviceConfig, stated: Option<&Stated>) -> Option<Unit> {
+fn unit(declared: &SubDeviceConfig, stated: Option<&StatedProperties>) -> Option<Unit> {
     let (vendor, product) = device(declared, stated);
     Some((vendor?, product?, declared.expected.serial?))
 }
@@ -95,7 +99,7 @@ const fn unit_of(info: &SubDeviceInfo) -> Unit {
 pub(super) type DeviceKey = (Option<u32>, Option<u32>);
 
 /// Vendor and product of a declared SubDevice.
-pub(super) fn device(config: &SubDeviceConfig, stated: Option<&Stated>) -> DeviceKey {
+pub(super) fn device(config: &SubDeviceConfig, stated: Option<&StatedProperties>) -> DeviceKey {
     let stated = stated.and_then(|stated| stated.device);
     let vendor = config.expected.vendor_id.or(stated.map(|device| device.0));
     (vendor, config.expected.product_code.or(stated.map(|device| device.1)))
@@ -108,7 +112,7 @@ pub(super) const fn keys_of(found: &SubDeviceInfo) -> [DeviceKey; 4] {
 }
 
 /// Whether a found SubDevice has the vendor and the product of a declared one.
-pub(super) fn is_device(config: &SubDeviceConfig, stated: Option<&Stated>, info: &SubDeviceInfo) -> bool {
+pub(super) fn is_device(config: &SubDeviceConfig, stated: Option<&StatedProperties>, info: &SubDeviceInfo) -> bool {
     let (vendor, product) = device(config, stated);
     vendor.is_none_or(|vendor| vendor == info.identity.vendor_id)
         && product.is_none_or(|product| product == info.identity.product_code)

@@ -10,7 +10,7 @@ use ringcat_engine::info::{PdoInfo, SubDeviceInfo};
 use ringcat_engine::{PlanWarning, plan};
 
 use super::assignment;
-use super::difference::{Difference, DifferenceKind, Stated};
+use super::difference::{Difference, DifferenceKind, StatedProperties};
 use super::modules;
 use super::process_data;
 use super::properties::{self, buffers, words};
@@ -26,7 +26,7 @@ pub(super) struct Both<'a> {
     /// Its name.
     pub(super) name: &'a str,
     /// What the file states besides.
-    pub(super) stated: Option<&'a Stated>,
+    pub(super) stated: Option<&'a StatedProperties>,
     /// What the scan found.
     pub(super) info: &'a SubDeviceInfo,
     /// Version of its firmware, if it was read.
@@ -168,7 +168,7 @@ impl Both<'_> {
 }
 
 /// Mailboxes of the file.
-fn mailbox(declared: &SubDeviceConfig, stated: Option<&Stated>) -> Option<[(u16, u16); 2]> {
+fn mailbox(declared: &SubDeviceConfig, stated: Option<&StatedProperties>) -> Option<[(u16, u16); 2]> {
     let of = |role: SyncManagerRole| {
         let mut sync_managers = declared.declared.iter().flatten();
         sync_managers

@@ -116,7 +116,7 @@ impl fmt::Display for Difference {
 /// Properties of a SubDevice that a file states and an activation does not compare.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
-pub struct Stated {
+pub struct StatedProperties {
     /// Vendor and product, also where they are not compared.
     pub device: Option<(u32, u32)>,
     /// Revision, also where it is not compared.

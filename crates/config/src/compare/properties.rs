@@ -8,7 +8,7 @@ use ringcat_engine::info::SubDeviceInfo;
 use ringcat_wire::register::{PortKind, SyncManagerControl, SyncManagerDirection, SyncManagerMode};
 use ringcat_wire::sii::{CoeDetails, MailboxLayout, MailboxProtocols, PhysicalPort};
 
-use super::difference::{DifferenceKind, Stated, StatedSyncManager};
+use super::difference::{DifferenceKind, StatedProperties, StatedSyncManager};
 
 /// Protocols in the order of their names.
 const PROTOCOLS: [(u16, &str); 6] = [
@@ -32,7 +32,11 @@ const MODE: u8 = 0x0F;
 type Property = (DifferenceKind, bool, String);
 
 /// The differences.
-pub(super) fn differences(declared: &SubDeviceConfig, stated: Option<&Stated>, info: &SubDeviceInfo) -> Vec<Property> {
+pub(super) fn differences(
+    declared: &SubDeviceConfig,
+    stated: Option<&StatedProperties>,
+    info: &SubDeviceInfo,
+) -> Vec<Property> {
     let mut differences = sync_managers(declared, stated, info);
     let Some(stated) = stated else { return differences };
     let boot = info.bootstrap.as_ref().map(buffers);
@@ -60,7 +64,7 @@ pub(super) fn words(mailbox: Option<[(u16, u16); 2]>) -> String {
 
 /// Settings that are written, those of an ENI, prevent OP if the SubDevice checks them: it refuses SAFEOP. A controller
 /// without a processor (device emulation) takes any.
-fn sync_managers(declared: &SubDeviceConfig, stated: Option<&Stated>, info: &SubDeviceInfo) -> Vec<Property> {
+fn sync_managers(declared: &SubDeviceConfig, stated: Option<&StatedProperties>, info: &SubDeviceInfo) -> Vec<Property> {
     let mut differences = Vec::new();
     // Without the category the addresses are not those of the SII.
     if info.sync_managers.is_empty() {
@@ -123,7 +127,7 @@ fn is_compatible(written: u8, own: u8) -> bool {
 }
 
 /// SyncManagers with process data by number: those that are written, else those that the file states.
-fn expected(declared: &SubDeviceConfig, stated: Option<&Stated>) -> BTreeMap<u8, StatedSyncManager> {
+fn expected(declared: &SubDeviceConfig, stated: Option<&StatedProperties>) -> BTreeMap<u8, StatedSyncManager> {
     let stated = stated.into_iter().flat_map(|stated| &stated.sync_managers);
     let mut expected: BTreeMap<u8, StatedSyncManager> = stated.map(|of| (of.number, *of)).collect();
     for it in declared.declared.iter().flatten().filter(|it| it.area().is_some_and(|area| area.length > 0)) {
@@ -133,7 +137,7 @@ fn expected(declared: &SubDeviceConfig, stated: Option<&Stated>) -> BTreeMap<u8,
     expected
 }
 
-fn of_protocols(stated: &Stated, info: &SubDeviceInfo) -> Option<String> {
+fn of_protocols(stated: &StatedProperties, info: &SubDeviceInfo) -> Option<String> {
     let (expected, got) = (stated.protocols?.0, info.protocols.0);
     let list = |bits: u16| names(PROTOCOLS.iter().filter(|(bit, _)| bits & bit != 0).map(|(_, name)| *name));
     let (missing, more) = (list(expected & !got), list(got & !expected));
@@ -145,7 +149,7 @@ fn of_protocols(stated: &Stated, info: &SubDeviceInfo) -> Option<String> {
     }
 }
 
-fn of_features(stated: &Stated, info: &SubDeviceInfo) -> Option<String> {
+fn of_features(stated: &StatedProperties, info: &SubDeviceInfo) -> Option<String> {
     let is_coe = stated.protocols?.coe() && info.protocols.coe();
     // An SII without CoE details contains no information about them.
     if !is_coe || info.coe.0 == 0 {
@@ -165,7 +169,7 @@ fn names<'a>(of: impl Iterator<Item = &'a str>) -> Option<String> {
     Some(of.collect::<Vec<_>>().join(", ")).filter(|text| !text.is_empty())
 }
 
-fn of_ports(stated: &Stated, info: &SubDeviceInfo) -> Option<String> {
+fn of_ports(stated: &StatedProperties, info: &SubDeviceInfo) -> Option<String> {
     let got = ports(info);
     if stated.ports.trim().is_empty() || got.is_empty() {
         return None;

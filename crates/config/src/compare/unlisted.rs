@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use ringcat_engine::info::SubDeviceInfo;
 
 use super::align::{self, Place};
-use super::difference::Stated;
+use super::difference::StatedProperties;
 use super::modules;
 use super::process_data;
 use crate::configuration::Configuration;
@@ -13,7 +13,7 @@ use crate::configuration::Configuration;
 impl Configuration {
     /// The declaration of each found SubDevice as [`Configuration::differences`] pairs them: its index in the file;
     /// `None` for a SubDevice that is not in it. `stated` is that of [`Configuration::differences`].
-    pub fn counterparts(&self, found: &[SubDeviceInfo], stated: &[Stated]) -> Vec<Option<usize>> {
+    pub fn counterparts(&self, found: &[SubDeviceInfo], stated: &[StatedProperties]) -> Vec<Option<usize>> {
         let mut counterparts = vec![None; found.len()];
         for place in align::align(self, found, stated) {
             if let Place::Both { config, info, .. } = place {
@@ -24,7 +24,7 @@ impl Configuration {
     }
 
     /// Whether the file assigns PDOs to a declared SubDevice that the SII of the found one does not list: it may have
-    /// modules in slots ([`Stated::modular`]).
+    /// modules in slots ([`StatedProperties::modular`]).
     pub fn has_unlisted_pdos(&self, config: usize, found: &SubDeviceInfo) -> bool {
         let listed: BTreeSet<u16> = found.pdos.iter().map(|pdo| pdo.index).collect();
         let declared = self.declaration.subdevices.get(config);

@@ -24,7 +24,7 @@ use super::stated::stated;
 use super::unique::Names;
 use super::values::{Shift, Time};
 use super::write::next_position;
-use crate::compare::Stated;
+use crate::compare::StatedProperties;
 use crate::configuration::{Configuration, DeclaredRings, ImageArea, ProcessImage, SubDeviceFacts, Variable};
 use crate::eni::Port;
 use crate::follow::{HIGH_WORD, LOW_WORD};
@@ -110,7 +110,7 @@ impl NetworkFile {
 
     /// What the file states of each SubDevice besides the declaration, for
     /// [`Configuration::differences`](crate::Configuration::differences).
-    pub fn stated(&self) -> Vec<Stated> {
+    pub fn stated(&self) -> Vec<StatedProperties> {
         self.subdevice.iter().map(stated).collect()
     }
 

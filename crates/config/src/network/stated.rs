@@ -3,14 +3,14 @@
 use ringcat_wire::sii::{CoeDetails, MailboxProtocols};
 
 use super::model::{Buffer, Mailbox, Protocol, SubDevice};
-use crate::compare::{Stated, StatedSyncManager};
+use crate::compare::{StatedProperties, StatedSyncManager};
 
-pub(super) fn stated(of: &SubDevice) -> Stated {
+pub(super) fn stated(of: &SubDevice) -> StatedProperties {
     let mailbox = of.mailbox.as_ref();
     let boot = |of: &Mailbox| Some(both(&of.boot_write?, &of.boot_read?));
     let sync_managers =
         of.sync_manager.iter().map(|it| StatedSyncManager { number: it.number, start: it.start, control: it.control });
-    Stated {
+    StatedProperties {
         device: of.vendor.zip(of.product),
         revision: of.revision,
         mailbox: mailbox.map(|of| both(&of.write, &of.read)),

@@ -322,8 +322,8 @@ fn domains(file: &NetworkFile, declaration: &mut Declaration, left_out: &mut Vec
     names
 }
 
-/// An ENI names the reference clock. Without a name the engine takes the first SubDevice with a clock, which the file
-/// does not know: it is the first one with SYNC signals.
+/// An ENI names the reference clock. Without a name the engine takes the first SubDevice with a clock. The
+/// file does not have this information: here it is the first SubDevice with SYNC signals.
 fn reference(configuration: &mut Configuration, left_out: &mut Vec<LeftOut>) -> Result<(), ExportError> {
     let configs = &configuration.declaration.subdevices;
     let first = configs.iter().position(|config| config.sync.is_some());

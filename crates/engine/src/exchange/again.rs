@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 use super::flight::CyclicFrame;
 use super::image::InputNumber;
 use super::proved::Proved;
-use super::way::Way;
+use super::round_trip::RoundTrip;
 use crate::board::Board;
 use crate::layout::{OutputsAgain, Piece, PlannedFrame, PlannedRepeat, RepeatRule};
 use crate::link::Link;
@@ -66,8 +66,8 @@ pub(super) enum Tries {
 pub(super) struct Again {
     /// The frame of the further tries.
     pub frame: CyclicFrame,
-    /// The way of the first try.
-    pub way: Way,
+    /// The round trip of the first try.
+    pub round_trip: RoundTrip,
     pieces: Box<[Piece]>,
     proofs: Box<[Proof]>,
     grids: Box<[SyncGrid]>,
@@ -112,7 +112,7 @@ impl Again {
         }
         Again {
             frame: again,
-            way: Way::default(),
+            round_trip: RoundTrip::default(),
             pieces: repeat.pieces.clone().into_boxed_slice(),
             proofs: proofs.into_boxed_slice(),
             grids: grids.into_boxed_slice(),

@@ -1,8 +1,8 @@
 //! Sends lost frames again within their cycle (decision 0045).
 //!
-//! Input: the times at which frames are lost ([`super::way`]), and the copies that came back. A frame of which the
-//! copies are not back by then, or whose copies show that the ring changed while they were on the wire, is sent again
-//! on all links, as long as it can come back before the next cycle. This is bounded: one check of all frames per
+//! Input: the times at which frames are lost ([`super::round_trip`]), and the copies that came back. A frame whose
+//! copies are not back by then, or show that the ring changed while they were on the wire, is sent again on all
+//! links, as long as it can come back before the next cycle. This is bounded: one check of all frames per
 //! call, and at least one round trip between two tries. It is away from the usual cycle, which only notes the time of
 //! the next check.
 
@@ -21,7 +21,7 @@ use crate::link::{Link, LinkSet};
 use crate::ring::{FrameCopy, Identity, RingState};
 use crate::time::Instant;
 
-/// Cycles between two applications of the learned ways of frames.
+/// Cycles between two applications of the measured round trips.
 const REFRESH: u64 = 64;
 
 impl Exchange {
@@ -77,8 +77,8 @@ impl Exchange {
     /// How long frames are waited for before they are sent again: the longest such time. `None` before enough frames
     /// came back, and where nothing is sent again.
     pub fn waits_for_ns(&self) -> Option<u64> {
-        let known = self.again.iter().flatten().map(|again| &again.way);
-        known.filter(|way| way.is_known()).map(|way| way.wait_ns()).max()
+        let known = self.again.iter().flatten().map(|again| &again.round_trip);
+        known.filter(|trip| trip.is_known()).map(|trip| trip.wait_ns()).max()
     }
 
     /// Sends frames again that are lost. All frames that had arrived at `received_at` were received; it is `now`.
@@ -117,18 +117,18 @@ impl Exchange {
         let left = first.left();
         let last_at = match again.tries(left) {
             Tries::Over | Tries::Complete => return Next::Never,
-            _ if first.is_complete() || first.is_vacant() || !again.way.is_known() => return Next::Never,
+            _ if first.is_complete() || first.is_vacant() || !again.round_trip.is_known() => return Next::Never,
             Tries::First if !first.is_waiting() => return Next::Never,
             Tries::Due => Instant(0),
             Tries::First => sent_at(first, domain.timeout_ns()),
             Tries::Again => again.sent_at,
         };
-        let lost_at = Instant(last_at.0.saturating_add(again.way.wait_ns()));
+        let lost_at = Instant(last_at.0.saturating_add(again.round_trip.wait_ns()));
         if lost_at > received_at && again.tries(left) != Tries::Due {
             return Next::At(lost_at);
         }
         let end = end_of_cycle(domain, first, self.cycle, self.base_ns, self.next_at);
-        let back = Instant(now.0.saturating_add(again.way.longest_ns()));
+        let back = Instant(now.0.saturating_add(again.round_trip.longest_ns()));
         let is_late =
             back > end || self.evidence.clocks.passes(again.grids(), sent_at(first, domain.timeout_ns()), back);
         if is_late {
@@ -167,7 +167,7 @@ impl Exchange {
         counters.sent += 1;
         counters.sent_again += 1;
         counters.bytes += length;
-        Instant(now.0.saturating_add(again.way.wait_ns()))
+        Instant(now.0.saturating_add(again.round_trip.wait_ns()))
     }
 
     /// Takes a copy of a further try.
@@ -262,7 +262,7 @@ impl Exchange {
         let left = self.cycle;
         for (index, (frame, again)) in self.frames.iter().zip(&mut self.again).enumerate() {
             if frame.is_waiting() && frame.left() == left {
-                let lost_at = again.as_mut().map_or(Instant::NEVER, |again| again.way.depart(now));
+                let lost_at = again.as_mut().map_or(Instant::NEVER, |again| again.round_trip.depart(now));
                 self.decide_at = self.decide_at.min(lost_at);
                 self.newest = index as u16;
             }
@@ -276,11 +276,11 @@ impl Exchange {
     fn learn_way(&mut self, index: usize, now: Instant, is_closed: bool) {
         let (Some(frame), Some(Some(again))) = (self.frames.get(index), self.again.get_mut(index)) else { return };
         let Some(domain) = self.domains.get(frame.domain()).filter(|_| frame.is_complete()) else { return };
-        if again.way.is_later(now) {
+        if again.round_trip.is_later(now) {
             let was_sent = again.was_sent(frame.left());
-            again.way.learn(sent_at(frame, domain.timeout_ns()), now, is_closed, was_sent);
+            again.round_trip.learn(sent_at(frame, domain.timeout_ns()), now, is_closed, was_sent);
         }
-        again.way.arrive();
+        again.round_trip.arrive();
     }
 
     /// A copy of any try was received: settles the cycle of the frame, or has it sent again at once.
@@ -288,7 +288,7 @@ impl Exchange {
         let is_closed = self.links == LinkSet::Ring && self.evidence.monitor.state() == RingState::Closed;
         if is_closed != self.is_closed {
             self.is_closed = is_closed;
-            self.again.iter_mut().flatten().for_each(|again| again.way.change(is_closed));
+            self.again.iter_mut().flatten().for_each(|again| again.round_trip.change(is_closed));
         }
         let first = &self.frames[index];
         let left = first.left();
@@ -343,10 +343,10 @@ impl Exchange {
         self.board.post_lost(self.tally.counters.lost);
     }
 
-    /// Applies what was learned about the ways of frames that can be sent again.
+    /// Applies the measured round trips of frames that can be sent again.
     #[cold]
     pub(super) fn refresh_ways(&mut self) {
-        self.again.iter_mut().flatten().for_each(|again| again.way.refresh(self.is_closed));
+        self.again.iter_mut().flatten().for_each(|again| again.round_trip.refresh(self.is_closed));
     }
 }
 

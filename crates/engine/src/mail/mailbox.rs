@@ -113,7 +113,7 @@ impl Mailbox {
 
     /// Notes that a transfer is under way, until what is returned is dropped.
     pub(super) fn begin_transfer(&self, kind: TransferKind, total: Option<u64>) -> UnderWayTransfer {
-        // No SubDevice has address 0: what a closed mailbox transfers is shown of none.
+        // No SubDevice has address 0: transfers of a closed mailbox belong to none.
         self.shared.bus.begin_transfer(self.station().unwrap_or(StationAddress(0)), kind, total)
     }
 

@@ -100,7 +100,7 @@ impl MainDevice {
         let segment = self.segment.with_application(&bus, board.clone(), data);
         segment.observe(Observation::Activated(declared));
         self.supervisor.attach(board);
-        self.supervisor.attach_bell(self.requests.bell().clone());
+        self.supervisor.attach_request_counter(self.requests.request_counter().clone());
         self.cyclic_events = Some(consumer);
         let periods = specs.iter().map(|spec| spec.period).collect();
         let under_way = specs.iter().map(|spec| spec.under_way).max().unwrap_or(1);

@@ -4,8 +4,8 @@ use super::MainDevice;
 use crate::event::{ClientEvents, ClientId, Subjects};
 
 impl MainDevice {
-    /// Registers a client of events with a queue of `size` events, at most 4,096, and with the subjects that it asks
-    /// for. It stays registered over activations and stops. `None` if there are 64 clients.
+    /// Registers a client of events with a queue of `size` events, at most 4,096, and with the subjects that it
+    /// requests. It stays registered over activations and stops. `None` if there are 64 clients.
     ///
     /// Its queue is separate from the events of the application: if one of the two does not fetch its events, the other
     /// loses none.

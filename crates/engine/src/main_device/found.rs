@@ -56,7 +56,7 @@ impl MainDevice {
         self.segment.view().found().map(|found| found.subdevices.len())
     }
 
-    /// Whether states of SubDevices are known: an INACTIVE knows them only while an ACTIVE reports them.
+    /// Whether states of SubDevices are known: an INACTIVE has them only while an ACTIVE reports them.
     pub(super) fn are_states_known(&self) -> bool {
         #[cfg(feature = "standby")]
         let is_known = self.role() == MainDeviceRole::Active || !self.segment.board.is_silent();

@@ -1,5 +1,5 @@
 //! Results of attempts to reach a requested state, for the procedures that wait for them. They are beside the model:
-//! their errors contain what only procedures know, and nothing of the model follows from them.
+//! their errors contain data that only procedures have, and the model does not depend on them.
 
 use alloc::rc::Rc;
 use alloc::vec::Vec;

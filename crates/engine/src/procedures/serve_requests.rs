@@ -12,13 +12,13 @@ use ringcat_wire::mailbox::soe::{Idn, SoeElements};
 
 use super::services::registers::{self, Urgency};
 use super::shared_segment::SharedSegment;
-use crate::bell::Bell;
 use crate::declared::Address;
 use crate::mail::coe::{self, SdoAddress, SdoError, SdoFailure};
 use crate::mail::soe::{self, SoeAddress, SoeError, SoeFailure};
 use crate::mail::voe::{self, Voe};
 use crate::mail::{Limits, Mailbox, MailboxError};
 use crate::request::{Access, AcyclicSide, Order, RequestFailure, RetryRequest, Subject};
+use crate::request_counter::RequestCounter;
 use crate::role::Function;
 use crate::segment::Observation;
 use crate::supervisor::{Bus, Signal};
@@ -29,13 +29,13 @@ use crate::time::Instant;
 pub(crate) struct Requests {
     all: Rc<RefCell<Vec<AcyclicSide>>>,
     retry: RetryRequest,
-    bell: Bell,
+    request_counter: RequestCounter,
 }
 
 impl Default for Requests {
     fn default() -> Requests {
-        let bell = Bell::default();
-        Requests { all: Rc::default(), retry: RetryRequest::new(bell.clone()), bell }
+        let request_counter = RequestCounter::default();
+        Requests { all: Rc::default(), retry: RetryRequest::new(request_counter.clone()), request_counter }
     }
 }
 
@@ -47,8 +47,8 @@ impl Requests {
     }
 
     /// Signalled by requests that are started or cancelled.
-    pub(crate) fn bell(&self) -> &Bell {
-        &self.bell
+    pub(crate) fn request_counter(&self) -> &RequestCounter {
+        &self.request_counter
     }
 
     /// The request of a cyclic thread to repeat failed configurations.
@@ -75,7 +75,7 @@ impl Requests {
 
 /// Runs until the MainDevice stops.
 pub(crate) async fn serve_requests(bus: Bus, segment: SharedSegment, requests: Requests) {
-    let (cancelled, rung) = (bus.signal(), bus.signal());
+    let (cancelled, posted_requests) = (bus.signal(), bus.signal());
     loop {
         let posted = bus.posted();
         if requests.any_cancelled() {
@@ -92,7 +92,7 @@ pub(crate) async fn serve_requests(bus: Bus, segment: SharedSegment, requests: R
                 None => served.fail(RequestFailure::Failed),
             }
         }
-        bus.until_posted(posted, Instant::NEVER, &rung, || false).await;
+        bus.until_posted(posted, Instant::NEVER, &posted_requests, || false).await;
     }
 }
 

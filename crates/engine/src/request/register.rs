@@ -3,8 +3,8 @@
 use ringcat_wire::address::RegisterAddress;
 
 use super::slot::{AcyclicSide, Request, RequestRefused, Subject, pair};
-use crate::bell::Bell;
 use crate::declared::Address;
+use crate::request_counter::RequestCounter;
 
 /// A request for registers of one SubDevice. It may be moved to the cyclic thread.
 ///
@@ -18,8 +18,12 @@ pub struct RegisterRequest {
 
 impl RegisterRequest {
     /// A request of up to `size` bytes to a SubDevice, and its acyclic side.
-    pub(crate) fn new(subdevice: Address, size: usize, bell: &Bell) -> (RegisterRequest, AcyclicSide) {
-        let (request, served) = pair(subdevice, size, Subject::Register { address: 0, length: 0 }, bell);
+    pub(crate) fn new(
+        subdevice: Address,
+        size: usize,
+        request_counter: &RequestCounter,
+    ) -> (RegisterRequest, AcyclicSide) {
+        let (request, served) = pair(subdevice, size, Subject::Register { address: 0, length: 0 }, request_counter);
         (RegisterRequest { request }, served)
     }
 

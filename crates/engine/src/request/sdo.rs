@@ -1,8 +1,8 @@
 //! SDO requests of a cyclic thread.
 
 use super::slot::{AcyclicSide, Request, RequestRefused, Subject, pair};
-use crate::bell::Bell;
 use crate::declared::Address;
+use crate::request_counter::RequestCounter;
 
 /// A request for objects of one SubDevice. It may be moved to the cyclic thread.
 #[derive(Debug)]
@@ -12,9 +12,9 @@ pub struct SdoRequest {
 
 impl SdoRequest {
     /// A request of `size` bytes for an object of a SubDevice, and its acyclic side.
-    pub(crate) fn new(subdevice: Address, size: usize, bell: &Bell) -> (SdoRequest, AcyclicSide) {
+    pub(crate) fn new(subdevice: Address, size: usize, request_counter: &RequestCounter) -> (SdoRequest, AcyclicSide) {
         let subject = Subject::Object { index: 0, sub_index: 0, complete_access: false };
-        let (request, served) = pair(subdevice, size, subject, bell);
+        let (request, served) = pair(subdevice, size, subject, request_counter);
         (SdoRequest { request }, served)
     }
 
@@ -48,7 +48,7 @@ mod tests {
     // covers: jobs, sdo
     #[test]
     fn a_request_is_executed_by_the_acyclic_side_and_returns_the_read_data() {
-        let (mut request, served) = SdoRequest::new(SubDeviceId(3).into(), 8, &Bell::default());
+        let (mut request, served) = SdoRequest::new(SubDeviceId(3).into(), 8, &RequestCounter::default());
         assert_eq!((request.state(), served.take()), (RequestState::Unused, None));
         request.set_object(0x2000, 7, true).unwrap();
         request.set_timeout(Duration::from_millis(5)).unwrap();
@@ -72,7 +72,7 @@ mod tests {
 
     #[test]
     fn data_beyond_the_capacity_is_refused_and_failures_are_returned() {
-        let (mut request, served) = SdoRequest::new(SubDeviceId(0).into(), 2, &Bell::default());
+        let (mut request, served) = SdoRequest::new(SubDeviceId(0).into(), 2, &RequestCounter::default());
         assert_eq!(request.write(&[1, 2, 3]), Err(RequestRefused::TooLong { bytes: 3, limit: 2 }));
         request.write(&[1, 2]).unwrap();
         assert_eq!(served.take().unwrap().access, Access::Write(vec![1, 2]));
@@ -92,7 +92,7 @@ mod tests {
 
     #[test]
     fn only_a_request_in_progress_is_cancelled() {
-        let (mut request, served) = SdoRequest::new(SubDeviceId(0).into(), 2, &Bell::default());
+        let (mut request, served) = SdoRequest::new(SubDeviceId(0).into(), 2, &RequestCounter::default());
         request.cancel();
         assert!(!served.is_cancelled());
         request.read().unwrap();

@@ -9,8 +9,8 @@ use core::time::Duration;
 
 use ringcat_wire::mailbox::sdo::AbortCode;
 
-use crate::bell::Bell;
 use crate::declared::Address;
+use crate::request_counter::RequestCounter;
 use ringcat_wire::mailbox::soe::SoeErrorCode;
 
 const UNUSED: u8 = 0;
@@ -144,7 +144,7 @@ struct Slot {
     /// Kind in the upper half, code in the lower.
     failure: AtomicU64,
     data: Box<[AtomicU8]>,
-    bell: Bell,
+    request_counter: RequestCounter,
 }
 
 /// Application side of a request of any kind.
@@ -163,7 +163,12 @@ pub(crate) struct AcyclicSide {
 const DEFAULT_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A request with `size` bytes of memory to a SubDevice, and its acyclic side.
-pub(super) fn pair(subdevice: Address, size: usize, subject: Subject, bell: &Bell) -> (Request, AcyclicSide) {
+pub(super) fn pair(
+    subdevice: Address,
+    size: usize,
+    subject: Subject,
+    request_counter: &RequestCounter,
+) -> (Request, AcyclicSide) {
     let slot = Arc::new(Slot {
         subdevice,
         state: AtomicU8::new(UNUSED),
@@ -174,7 +179,7 @@ pub(super) fn pair(subdevice: Address, size: usize, subject: Subject, bell: &Bel
         length: AtomicU32::new(0),
         failure: AtomicU64::new(0),
         data: (0..size).map(|_| AtomicU8::new(0)).collect(),
-        bell: bell.clone(),
+        request_counter: request_counter.clone(),
     });
     (Request { slot: slot.clone() }, AcyclicSide { slot })
 }
@@ -215,7 +220,7 @@ impl Request {
     fn start(&mut self, requested: u8) {
         self.slot.cancelled.store(false, Ordering::Relaxed);
         self.slot.state.store(requested, Ordering::Release);
-        self.slot.bell.ring();
+        self.slot.request_counter.increment();
     }
 
     pub(super) fn start_read(&mut self) -> Result<(), RequestRefused> {
@@ -241,7 +246,7 @@ impl Request {
     pub fn cancel(&self) {
         if self.state() == RequestState::Busy {
             self.slot.cancelled.store(true, Ordering::Release);
-            self.slot.bell.ring();
+            self.slot.request_counter.increment();
         }
     }
 

@@ -3,8 +3,8 @@
 use ringcat_wire::mailbox::soe::{Idn, SoeElements};
 
 use super::slot::{AcyclicSide, Request, RequestRefused, Subject, pair};
-use crate::bell::Bell;
 use crate::declared::Address;
+use crate::request_counter::RequestCounter;
 
 /// A request for elements of IDNs of one SubDevice. It may be moved to the cyclic thread.
 #[derive(Debug)]
@@ -14,9 +14,9 @@ pub struct SoeRequest {
 
 impl SoeRequest {
     /// A request of up to `size` bytes to a SubDevice, and its acyclic side.
-    pub(crate) fn new(subdevice: Address, size: usize, bell: &Bell) -> (SoeRequest, AcyclicSide) {
+    pub(crate) fn new(subdevice: Address, size: usize, request_counter: &RequestCounter) -> (SoeRequest, AcyclicSide) {
         let subject = Subject::Idn { drive: 0, idn: 0, elements: SoeElements::VALUE.0 };
-        let (request, served) = pair(subdevice, size, subject, bell);
+        let (request, served) = pair(subdevice, size, subject, request_counter);
         (SoeRequest { request }, served)
     }
 

@@ -1,8 +1,8 @@
 //! VoE handlers of a cyclic thread (IgH manual: VoE handlers).
 
 use super::slot::{AcyclicSide, Request, RequestRefused, RequestState, Subject, pair};
-use crate::bell::Bell;
 use crate::declared::Address;
+use crate::request_counter::RequestCounter;
 
 /// Header of a vendor message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -22,8 +22,8 @@ pub struct VoeHandler {
 
 impl VoeHandler {
     /// A handler of messages of up to `size` bytes, without their header, and its acyclic side.
-    pub(crate) fn new(subdevice: Address, size: usize, bell: &Bell) -> (VoeHandler, AcyclicSide) {
-        let (request, served) = pair(subdevice, size, Subject::Vendor { id: 0, kind: 0 }, bell);
+    pub(crate) fn new(subdevice: Address, size: usize, request_counter: &RequestCounter) -> (VoeHandler, AcyclicSide) {
+        let (request, served) = pair(subdevice, size, Subject::Vendor { id: 0, kind: 0 }, request_counter);
         (VoeHandler { request }, served)
     }
 

@@ -18,12 +18,12 @@ use crate::time::Instant;
 /// Maximum wait for a SubDevice that is being read, before the others of the gap are matched.
 pub(super) const HOLD: Duration = Duration::from_secs(1);
 
-/// Members beside which a SubDevice without a declaration was there: it is none of these, whatever its identity is.
+/// Members that were present together with a SubDevice without a declaration: it is none of these.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Presence {
     /// Number of the first round in which it answered.
     pub since: Option<u64>,
-    /// Members that answered while it was there, or was known to be none of them, and have left since.
+    /// Members that answered while it was present, or was known to be none of them, and have left since.
     beside: Vec<usize>,
 }
 
@@ -35,14 +35,14 @@ impl Presence {
         }
     }
 
-    /// It was there beside a member.
+    /// It was present together with a member.
     pub fn is_beside(&mut self, index: usize) {
         if !self.beside.contains(&index) {
             self.beside.push(index);
         }
     }
 
-    /// Whether it was there beside a member.
+    /// Whether it was present together with a member.
     pub fn was_beside(&self, index: usize) -> bool {
         self.beside.contains(&index)
     }
@@ -63,7 +63,7 @@ pub struct Unassigned {
     pub reported: bool,
     /// Since this time several members are possible.
     pub(super) held_since: Option<Instant>,
-    /// Members beside which it was there.
+    /// Members that were present together with it.
     pub(super) presence: Presence,
     /// Where the PDOs of its SII are known from when it is read.
     pub(super) pdo_source: PdoSource,

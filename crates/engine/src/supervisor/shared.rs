@@ -10,21 +10,21 @@ use super::alone::Alone;
 use super::command_reports::{CommandReports, WrongCommand};
 use super::counters::AcyclicCounters;
 use super::debug_message::DebugMessages;
-use super::flights::Flights;
 use super::long_transfers::LongTransfers;
 use super::memory_writes::MemoryWrites;
 use super::outbox::{Outbox, Rank};
 use super::posted::Watchers;
 use super::reply::BusError;
 use super::round_trip::RoundTrip;
+use super::sent_frames::SentFrames;
 use super::silence::Silence;
 use super::stray::Strays;
 use super::task::{Task, TaskId};
 use super::transfer::{Request, Stage, Transfer, TransferId, Transfers};
-use crate::bell::Bell;
 use crate::board::Board;
 use crate::event::{Event, EventLog, Occupant};
 use crate::link::{LinkOrder, LinkSet};
+use crate::request_counter::RequestCounter;
 use crate::ring::{Identity, RingMonitor};
 use crate::role::RoleControl;
 use crate::time::Instant;
@@ -48,7 +48,7 @@ pub(crate) struct Shared {
     pub(crate) outbox: Outbox,
     pub(crate) debug_messages: DebugMessages,
     pub(crate) alone: Alone,
-    pub(crate) flights: Flights,
+    pub(crate) sent_frames: SentFrames,
     pub(crate) silence: Silence,
     /// Carrier by link, if the links report it.
     pub(crate) carriers: [Option<bool>; 2],
@@ -62,7 +62,7 @@ pub(crate) struct Shared {
     /// The order to the link layer that waits for the runtime.
     pub(crate) link_order: Option<LinkOrder>,
     pub(super) watchers: Watchers,
-    pub(super) bell: Bell,
+    pub(super) request_counter: RequestCounter,
     /// Largest number of datagrams in a frame.
     pub(crate) max_datagrams: usize,
     pub(crate) role: RoleControl,
@@ -101,7 +101,7 @@ impl Shared {
             outbox: Outbox::default(),
             debug_messages: DebugMessages::default(),
             alone: Alone::default(),
-            flights: Flights::new(),
+            sent_frames: SentFrames::new(),
             silence: Silence::default(),
             carriers: [None; 2],
             strays: Strays::default(),
@@ -110,7 +110,7 @@ impl Shared {
             blocked: None,
             link_order: None,
             watchers: Watchers::default(),
-            bell: Bell::default(),
+            request_counter: RequestCounter::default(),
             max_datagrams: usize::MAX,
             role: RoleControl::default(),
             memory_writes: MemoryWrites::default(),
@@ -172,7 +172,7 @@ impl Shared {
             true => self.alone.next_deadline(self.now),
             false => self.outbox.next_deadline(self.now),
         };
-        let timer = timer.min(self.flights.next_deadline()).min(queue.unwrap_or(Instant::NEVER));
+        let timer = timer.min(self.sent_frames.next_deadline()).min(queue.unwrap_or(Instant::NEVER));
         #[cfg(feature = "standby")]
         let timer = timer.min(self.due_beside.0);
         timer

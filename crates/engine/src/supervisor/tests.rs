@@ -236,9 +236,9 @@ fn timers_fire_in_order_and_a_group_wakes_its_waiter_once() {
 fn work_that_comes_between_two_questions_is_due_at_once() {
     const MS: u64 = 1_000_000;
     let mut bench = Bench::new(LinkSet::Single);
-    let (board, bell) = (Arc::new(Board::new(1)), Bell::default());
+    let (board, request_counter) = (Arc::new(Board::new(1)), RequestCounter::default());
     bench.supervisor.attach(board.clone());
-    bench.supervisor.attach_bell(bell.clone());
+    bench.supervisor.attach_request_counter(request_counter.clone());
     let (bus, signal) = (bench.supervisor.bus(), bench.supervisor.bus().signal());
     bench.start(async move {
         loop {
@@ -252,7 +252,7 @@ fn work_that_comes_between_two_questions_is_due_at_once() {
     };
     idle(&mut bench);
     // Words of other threads, and those of the links.
-    bell.ring();
+    request_counter.increment();
     assert_eq!(due(&bench), [bench.now; 2]);
     idle(&mut bench);
     board.post_supervision(1);

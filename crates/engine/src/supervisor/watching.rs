@@ -15,7 +15,7 @@ use crate::time::Instant;
 
 impl Shared {
     pub(super) fn posted(&self) -> Posted {
-        let requests = self.bell.rung();
+        let requests = self.request_counter.value();
         let Some(board) = &self.board else {
             return Posted { carriers: self.carriers, requests, ..Posted::default() };
         };
@@ -32,7 +32,7 @@ impl Shared {
 
     #[inline(always)]
     fn posted_words(&self) -> PostedWords {
-        let requests = self.bell.rung();
+        let requests = self.request_counter.value();
         let Some(board) = self.board.as_deref() else { return PostedWords { requests, ..PostedWords::default() } };
         let (supervision, ring, holds) = (board.supervision_word(), board.ring_word(), board.clocks.holds());
         let result = if self.watchers.wants_result { board.supervision_number() } else { 0 };

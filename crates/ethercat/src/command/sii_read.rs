@@ -2,7 +2,7 @@
 
 use ringcat_control::client::ClientError;
 use ringcat_control::message::{Answer, Query};
-use ringcat_control::tool::{MOST_IMAGES, SiiLine, ToolAnswer, ToolQuery, TransferWork};
+use ringcat_control::tool::{MAX_IMAGES, SiiLine, ToolAnswer, ToolQuery, TransferWork};
 
 use crate::append::append;
 use crate::failure::{Failure, unexpected};
@@ -61,7 +61,7 @@ fn corrupted() -> Failure {
 fn print_json(session: &mut Session<'_>) -> Result<(), Failure> {
     let (master, positions) = session.some_slaves()?;
     let mut failure = None;
-    for positions in positions.chunks(MOST_IMAGES) {
+    for positions in positions.chunks(MAX_IMAGES) {
         for (position, image) in read(session, master, positions)? {
             match image {
                 Ok(image) => {

@@ -26,7 +26,7 @@ pub struct Watched {
     pub slaves: Vec<Slave>,
 }
 
-/// The lines of a master; `last` is its cycles when they were asked for before.
+/// The lines of a master; `last` are its cycles at the previous request.
 pub fn lines(master: &MasterState, watched: &Watched, last: Option<CycleReport>) -> Vec<String> {
     let Watched { report, state, counts, domains, slaves } = watched;
     let ring = format!("  ring        {}\n", state_of(&state.ring, report.links.len()));
@@ -74,7 +74,7 @@ fn frames(links: &[LinkReport]) -> String {
     format!("  frames      {sent:.0}/s, {lost:.0}/s lost, {all} lost in all\n")
 }
 
-/// The mean cycle since the last question, or only their number.
+/// The mean cycle time since the previous request, or only the number of cycles.
 fn cycles(now: CycleReport, last: Option<CycleReport>) -> String {
     let [late, skipped, incomplete] = now.late_skipped_incomplete;
     let mean = last.and_then(|last| {
@@ -139,11 +139,11 @@ mod tests {
 
     // covers: daemon
     #[test]
-    fn a_cycle_time_is_the_mean_since_the_last_question() {
+    fn a_cycle_time_is_the_mean_since_the_previous_request() {
         let last = report(1_000, 5_000_000, 0);
         let now = cycles(report(1_500, 505_500_000, 12_000), Some(last));
         assert_eq!(now, "  cycles      1.001 ms, 3 late by at most 0.012 ms, 2 left out, 1 incomplete\n");
-        // The first question, and another application since: its cycles begin anew.
+        // The first request; another application since, whose cycles begin at 0.
         assert_eq!(cycles(last, None), "  cycles      1000 done, 1 incomplete\n");
         assert_eq!(cycles(report(7, 1, 0), Some(last)), "  cycles      7 done, 1 incomplete\n");
         assert_eq!(cycles(last, Some(last)), "  cycles      1000 done, 1 incomplete\n");
@@ -151,7 +151,7 @@ mod tests {
 
     // covers: daemon
     #[test]
-    fn working_counters_that_are_wrong_stand_out() {
+    fn wrong_working_counters_are_marked() {
         let domain = DomainLine { wkc: 2, expected: 3, by_link: Some([2, 0]), ..DomainLine::default() };
         assert_eq!(working_counter(0, &domain), "  Domain0     working counter 2/3 (2+0)  INCOMPLETE\n");
         let domain = DomainLine { wkc: 3, by_link: None, ..domain };

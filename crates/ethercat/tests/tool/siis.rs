@@ -29,7 +29,7 @@ fn with(image: &[u8], at: usize, mask: u8) -> Vec<u8> {
     image
 }
 
-/// Changes a byte of the EEPROM in a way that no EEPROM has: without a command.
+/// Changes a byte of the EEPROM without a command, which no real EEPROM does.
 fn flip(bench: &Bench, position: usize, offset: usize, mask: u8) {
     let fault = Fault::CorruptSii { device: DeviceIndex(position), offset, mask };
     bench.inside(0, move |segment| segment.network_mut().apply(fault));
@@ -60,7 +60,7 @@ fn kept(bench: &Bench) {
 /// The EEPROM is written by others: through the registers, by the PDI, by the tool.
 fn written(bench: &Bench) {
     let image = whole(bench, 1);
-    // It may be offered to the PDI since another round.
+    // It may still be offered to the PDI from the round before.
     registers(bench, 1, "0x0500", &[0]);
     let word = |value: u8| [value, image[BEHIND + 1]];
     let address = ((BEHIND / 2) as u32).to_le_bytes();
@@ -68,7 +68,7 @@ fn written(bench: &Bench) {
     registers(bench, 1, "0x0502", &command);
     let wanted = with(&image, BEHIND, image[BEHIND] ^ 0xA5);
     bench.wait_until("a word written by registers", || whole(bench, 1) == wanted);
-    // The PDI takes what is offered, writes, and gives it back.
+    // The PDI takes the offered EEPROM, writes it, and releases it.
     registers(bench, 1, "0x0500", &[1]);
     bench.inside(0, move |segment| {
         let network = segment.network_mut();

@@ -9,7 +9,7 @@ use crate::bench::{Bench, Driver, directory};
 use crate::golden_bus::{WITH_SOE, ring};
 use crate::operation::declare;
 
-/// What surrounds the commands.
+/// The state of the bus around the commands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Situation {
     Whole,

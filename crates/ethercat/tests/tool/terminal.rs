@@ -105,7 +105,7 @@ fn assert_bar(shown: &str, name: &str, has_share: bool) {
 
 // covers: daemon
 #[test]
-fn what_takes_seconds_shows_a_bar_in_a_terminal_and_nowhere_else() {
+fn a_long_transfer_shows_a_bar_in_a_terminal_and_nowhere_else() {
     let directory = directory();
     let mut on = segment(&directory, WITH_SOE);
     let input = &mut on.devices[1];
@@ -119,7 +119,7 @@ fn what_takes_seconds_shows_a_bar_in_a_terminal_and_nowhere_else() {
     };
     slow(400);
     assert_bar(&in_terminal(&bench, "$E sii_read -p1 > sii"), "sii_read", true);
-    // The read before is kept; a write looks at each word of the EEPROM.
+    // The read before is kept; a write reads each word of the EEPROM.
     slow(1200);
     assert_bar(&in_terminal(&bench, "$E sii_write -p1 sii"), "sii_write", true);
     std::fs::write(bench.directory.join("fw.bin"), vec![7; FILE]).expect("it can be written");
@@ -142,7 +142,7 @@ fn what_takes_seconds_shows_a_bar_in_a_terminal_and_nowhere_else() {
 
 // covers: daemon
 #[test]
-fn what_takes_no_time_shows_no_bar() {
+fn a_short_transfer_shows_no_bar() {
     let directory = directory();
     let on = segment(&directory, WITH_SOE);
     let bench = Bench::start_in(directory, vec![on]);
@@ -230,10 +230,10 @@ fn a_table_in_a_pipe_is_printed_once_idle_and_beside_an_application() {
     let terminal = Terminal::start(&bench, "$E watch --once");
     assert!(terminal.end().0.starts_with(title.trim_end()));
     let mut terminal = Terminal::start(&bench, "$E watch -m0");
-    // The mean of a second question, on a busy machine at least a cycle of 1 ms.
+    // The mean after a second request, on a busy machine at least a cycle of 1 ms.
     let begin = terminal.wait_for("  cycles      1.0", 0);
     terminal.wait_for(" ms, ", begin.saturating_sub(200));
     terminal.press(b"q");
     assert_eq!(terminal.end().1, Some(0));
-    assert!(bench.bad(&["watch", "--json"]).starts_with("'watch' is for people: it has no --json!\n"));
+    assert!(bench.bad(&["watch", "--json"]).starts_with("'watch' only prints a table: it has no --json!\n"));
 }

@@ -1,4 +1,4 @@
-//! Handles of C: a mark before an object. The mark goes when the handle ends; the memory is kept for a while, so
+//! Handles of C: a mark before an object. The mark is erased when the handle ends; the memory is kept for a while, so
 //! that late calls find the missing mark. It includes the generation of the process: in a child made by `fork` no
 //! handle of its parent is alive, since the threads behind it are missing there.
 

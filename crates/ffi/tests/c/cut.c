@@ -1,4 +1,4 @@
-/* Cycles until its input ends; says "op" when all are in OP. A hundredth of the cycles queues the domain once more. */
+/* Cycles until its input ends; prints "op" when all are in OP. Each hundredth cycle queues the domain once more. */
 #include <poll.h>
 #include <stdio.h>
 #include <time.h>

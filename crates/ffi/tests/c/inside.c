@@ -1,7 +1,7 @@
 /*
- * Settings whose effects a test judges inside the SubDevices: says "refused" while the drive, which refuses SAFEOP
- * once, waits for a reset, "op" when all are in OP, and goes on after a line of its input with emergencies, a whole
- * object and a jump of the reference clock.
+ * Settings whose effects a test checks inside the SubDevices. Prints "refused" while the drive, which refuses SAFEOP
+ * once, waits for a reset, and "op" when all are in OP. After a line of its input it continues with emergencies, a
+ * complete object and a jump of the reference clock.
  */
 #include <arpa/inet.h>
 #include <errno.h>
@@ -61,7 +61,7 @@ static int addresses(ec_slave_config_t *sc)
     return 0;
 }
 
-/* Other PDOs, and another mapping: what was there before would be beside them. */
+/* Other PDOs and another mapping, which replace those before. */
 static int pdos(void)
 {
     static const ec_pdo_info_t outputs[] = {{0x1600, 0, NULL}};
@@ -75,7 +75,7 @@ static int pdos(void)
     CHECK(ecrt_slave_config_pdo_mapping_add(sc, 0x1601, 0x6060, 0, 8) == 0);
     CHECK(ecrt_slave_config_pdo_mapping_add(sc, 0x1601, 0, 0, 8) == 0);
     CHECK(ecrt_slave_config_pdo_mapping_add(sc, 0x1601, 0x6040, 0, 16) == 0);
-    /* Behind the PDO that is assigned already, with its default mapping. */
+    /* After the PDO that is assigned already, with its default mapping. */
     CHECK(ecrt_slave_config_pdo_assign_add(sc, 3, 0x1A01) == 0);
     /* No entries: the default mapping stays. No PDOs: the default assignment stays. */
     CHECK(ecrt_slave_config_pdos(configs[PROTOCOLS], EC_END, syncs) == 0);
@@ -145,7 +145,7 @@ static void wait_for_line(void)
         fprintf(stderr, "the input has ended\n");
 }
 
-/* Three come, each before the answer to a read, and two fit. */
+/* Three are sent, each before the answer to a read, and two fit. */
 static int emergencies(void)
 {
     ec_slave_config_t *sc = configs[DRIVE];
@@ -163,7 +163,7 @@ static int emergencies(void)
     }
     CHECK(ecrt_slave_config_emerg_pop(sc, data) == -ENOENT && ecrt_slave_config_emerg_overruns(sc) == 1);
     CHECK(ecrt_slave_config_emerg_clear(sc) == 0 && ecrt_slave_config_emerg_overruns(sc) == 0);
-    /* One more comes, and is dropped before the program takes it. */
+    /* One more is sent, and is dropped before the program takes it. */
     CHECK(ecrt_master_sdo_upload(master, DRIVE, 0x6066, 0, data, sizeof data, &size, &abort_code) == 0);
     CHECK(ecrt_slave_config_emerg_clear(sc) == 0 && ecrt_slave_config_emerg_pop(sc, data) == -ENOENT);
     return 0;

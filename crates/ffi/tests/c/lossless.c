@@ -1,7 +1,7 @@
 /*
- * A loop of its own on a ring whose cables are cut and repaired: lossless PERIOD_US again|once|late|file [FILE].
+ * A cyclic loop on a ring whose cables are cut and repaired: lossless PERIOD_US again|once|late|file [FILE].
  * "again": lost frames are sent again; "late": as well, but the loop receives once, before it processes; "file": the
- * domains are those of a network file. Says "op" when frames can be sent again, then the times of CLOCK_MONOTONIC at
+ * domains are those of a network file. Prints "op" when frames can be sent again, then the times of CLOCK_MONOTONIC at
  * which cycles were incomplete, without those in which this thread was late. At the end of its input it prints the
  * number of cycles, and of those in which it was late.
  */
@@ -36,7 +36,7 @@ static uint64_t now_ns(void)
     return (uint64_t) now.tv_sec * 1000000000U + (uint64_t) now.tv_nsec;
 }
 
-/* A thread that wakes up late by a tenth of the period has not done its part. */
+/* A thread that wakes up late by more than a tenth of the period is not in time. */
 static void sleep_until(uint64_t at_ns)
 {
     struct timespec at = {(time_t) (at_ns / 1000000000U), (long) (at_ns % 1000000000U)};

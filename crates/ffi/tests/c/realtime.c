@@ -1,11 +1,11 @@
 /*
  * realtime own|daemon: cyclic calls beside another thread. The functions that the manual marks as fit for a real-time
- * thread allocate nothing and call the system for frames alone; a second caller at the same time gets -EBUSY and
- * nothing breaks. With "own" receive and send are not counted: the segment that is simulated in this process allocates
- * in them.
+ * thread allocate nothing and make system calls only for frames; a second caller at the same time gets -EBUSY, and the
+ * first one is not disturbed. With "own" receive and send are not counted: the segment that is simulated in this
+ * process allocates in them.
  *
- * While it counts, a write to no descriptor says in which part of the cycle the thread is, for a reader of its system
- * calls: "counted", "frames", "pause". The names of the functions follow at the end.
+ * While it counts, writes to an invalid descriptor mark the parts of the cycle in a trace of system calls: "counted",
+ * "frames", "pause". At the end it prints the names of the functions.
  */
 #include <errno.h>
 #include <pthread.h>
@@ -20,7 +20,7 @@
 #define CHECK(holds) \
     do { if (!(holds)) { fprintf(stderr, "line %d: %s\n", __LINE__, #holds); return 1; } } while (0)
 
-/* Calls a function for real-time threads, and keeps its name. */
+/* Calls a function for real-time threads, and records its name. */
 #define RT(function, arguments) (keep(#function), function arguments)
 /* The same; it has to return 0. */
 #define OK(function, arguments) expect(#function, RT(function, arguments))
@@ -288,7 +288,7 @@ static int configure(void)
     return ecrt_master_activate(master);
 }
 
-/* Two threads call at once: one of them is refused, and neither breaks anything. */
+/* Two threads call at once: one of them is refused, and the other one is not disturbed. */
 static int both(void)
 {
     pthread_t other;

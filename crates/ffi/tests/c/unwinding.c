@@ -1,4 +1,4 @@
-/* Whether a panic finds its way through functions of the library: they have tables of unwinding. */
+/* Whether a panic can unwind through functions of the library: they have unwind tables. */
 #include <stdio.h>
 
 #include <ecrt.h>

@@ -1,4 +1,4 @@
-//! What a program has set is judged inside the simulated SubDevices.
+//! Settings of a program, checked inside the simulated SubDevices.
 
 use std::io::{Read, Write};
 use std::process::Stdio;
@@ -62,7 +62,7 @@ fn check_settings(bench: &Bench) {
 
 // covers: c-interface, daemon
 #[test]
-fn what_a_program_has_set_is_inside_the_subdevices() {
+fn settings_of_a_program_reach_the_subdevices() {
     let Some(inside) = program(&here().join("tests/c/inside.c"), &[]) else { return };
     let bench = Bench::start(&here().join("tests/c/services.toml"), "inside");
     bench.inside(|segment| {

@@ -169,7 +169,7 @@ fn the_prefix_of_the_manual_has_its_layout_and_no_file_names_the_build() {
     assert!(pc.starts_with("prefix=/opt/etherlab\n"), "{pc}");
 }
 
-/// Those of another processor, as for a cross compilation: each tool leaves its name here, and works for this one.
+/// Tools as for a cross compilation: each one records its name, and works for this processor.
 // covers: c-interface
 #[test]
 fn an_installation_uses_the_tools_that_are_named() {

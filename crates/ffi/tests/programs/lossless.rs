@@ -1,4 +1,4 @@
-//! A C program with a loop of its own on a ring whose cables are cut and repaired.
+//! A C program with a cyclic loop on a ring whose cables are cut and repaired.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -17,13 +17,13 @@ use crate::library::{here, program, workshop};
 const SUBDEVICES: usize = 8;
 /// A second try needs 5 ms of it: this machine may stall for the rest.
 const PERIOD: Duration = Duration::from_millis(30);
-/// Cuts and repairs each come in so many phases of a flight.
+/// Number of phases of a round trip in which cuts and repairs occur.
 const PHASES: u32 = 12;
 /// Closed, the ring takes 9 cables of 50 us.
 const SEGMENT: &str = "[segment]\nring = true\ncable_ns = 50000\n[[device]]\ntype = \"digital-output-8\"\ncount = 8\n";
 const FLIGHT: Duration = Duration::from_micros(50 * (SUBDEVICES as u64 + 1));
 
-/// A machine that stalls in a way that is not seen takes a run with it, not each of so many.
+/// Number of runs: an undetected stall of the machine fails a run, but hardly all of them.
 const RUNS: usize = 3;
 
 /// A file with this name.

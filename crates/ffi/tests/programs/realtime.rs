@@ -1,4 +1,4 @@
-//! Functions for a real-time thread: they neither allocate nor wait, and call the system for frames alone.
+//! Functions for a real-time thread: they neither allocate nor wait, and make system calls only for frames.
 
 use std::collections::BTreeSet;
 use std::process::{Command, Output};
@@ -10,7 +10,7 @@ use crate::library::{here, on_segment, program, root, workshop};
 const OF_FRAMES: [&str; 8] = ["read", "readv", "recvfrom", "recvmsg", "sendto", "sendmsg", "write", "writev"];
 
 /// The functions that docs/ecrt.md names as fit for real-time threads.
-fn promised() -> BTreeSet<String> {
+fn listed() -> BTreeSet<String> {
     let page = std::fs::read_to_string(root().join("docs/ecrt.md")).expect("docs/ecrt.md");
     let (_, section) = page.split_once("\n## Real-time threads\n").expect("the section");
     let section = section.split("\n## ").next().expect("it has an end");
@@ -22,7 +22,7 @@ fn check(said: &str) {
     assert!(said.lines().any(|line| line == "allocations 0"), "{said}");
     let called: BTreeSet<String> =
         said.lines().filter_map(|line| line.strip_prefix("function ")).map(str::to_owned).collect();
-    assert_eq!(called, promised(), "called by the program, and promised by docs/ecrt.md");
+    assert_eq!(called, listed(), "functions that the program calls, and those that docs/ecrt.md lists");
 }
 
 // covers: c-interface, no-allocation
@@ -49,7 +49,7 @@ fn calls(trace: &str) -> Vec<(&str, &str)> {
 /// Receive and send included: the segment is in another process here.
 // covers: c-interface, daemon, no-allocation
 #[test]
-fn real_time_functions_call_the_system_for_frames_alone() {
+fn real_time_functions_make_system_calls_only_for_frames() {
     let Some(realtime) = program(&here().join("tests/c/realtime.c"), &[]) else { return };
     let bench = Bench::start(&here().join("tests/c/services.toml"), "realtime");
     let trace = workshop().join("realtime.strace");

@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use ringcat_config::eni::{Eni, EniError, MAX_BYTES, Mailbox, MailboxBuffer, read};
-use ringcat_config::{Configuration, Difference, Stated, follow};
+use ringcat_config::{Configuration, Difference, StatedProperties, follow};
 use ringcat_engine::Topology;
 use ringcat_engine::info::SubDeviceInfo;
 use ringcat_engine::main_device::Declaration;
@@ -131,9 +131,9 @@ impl EniFile {
     }
 
     /// What the file states of each SubDevice besides the declaration (`Info`), to compare it with a network.
-    pub fn stated(&self) -> Vec<Stated> {
+    pub fn stated(&self) -> Vec<StatedProperties> {
         let stated = |subdevice: &ringcat_config::eni::SubDevice| {
-            let mut stated = Stated::default();
+            let mut stated = StatedProperties::default();
             // The elements are required in an ENI: 0 means that the identity is not stated.
             let [vendor, product, revision] = [subdevice.vendor_id, subdevice.product_code, subdevice.revision]
                 .map(|number| number.filter(|number| *number != 0));

@@ -10,7 +10,7 @@ use ringcat_engine::time::Instant;
 use ringcat_link::WakeUp;
 use ringcat_wire::frame::MacAddress;
 
-use super::{ForeignFrame, LAST_FRAMES, Listened, ListenedPhase, ListeningSockets, has_commands};
+use super::{ForeignFrame, LAST_FRAMES, ListeningPhase, ListeningSockets, ListeningState, has_commands};
 use crate::links::{Links, PerLink};
 use crate::text::address_of_sender;
 
@@ -41,7 +41,7 @@ struct Quiet<L> {
 /// The silence on the links until now.
 #[derive(Debug)]
 struct Silence {
-    listened: Arc<Listened>,
+    listened: Arc<ListeningState>,
     sockets: Arc<dyn ListeningSockets>,
     /// How they were bound when the silence began.
     binding: Option<u32>,
@@ -55,12 +55,17 @@ struct Silence {
 impl<L: Links> QuietLinks<L> {
     /// Links of an acyclic half. They listen with those of the cyclic half too, unless the segment is free already.
     /// Nothing may have been sent on any of them.
-    pub fn new(acyclic: L, cyclic: L, listened: Arc<Listened>, sockets: Arc<dyn ListeningSockets>) -> QuietLinks<L> {
+    pub fn new(
+        acyclic: L,
+        cyclic: L,
+        listened: Arc<ListeningState>,
+        sockets: Arc<dyn ListeningSockets>,
+    ) -> QuietLinks<L> {
         let now = acyclic.now();
         let binding = sockets.binding();
         let (carriers, carriers_since) = ([false; 2], [now; 2]);
         let silence = Silence { listened, sockets, binding, carriers, carriers_since, silent_since: now };
-        let is_free = silence.listened.phase() == ListenedPhase::Free;
+        let is_free = silence.listened.phase() == ListeningPhase::Free;
         let mut links =
             QuietLinks { links: acyclic, quiet: (!is_free).then_some(Quiet { other_half: cyclic, silence }) };
         links.look();
@@ -80,7 +85,7 @@ impl<L: Links> QuietLinks<L> {
             }
         }
         if silence.is_over(now) {
-            silence.listened.set(ListenedPhase::Free);
+            silence.listened.set(ListeningPhase::Free);
             self.quiet = None;
         }
     }
@@ -88,7 +93,7 @@ impl<L: Links> QuietLinks<L> {
     /// The end of a wait: while listening, the next check.
     fn end_of(&self, now: Instant, until: Instant) -> Instant {
         let Some(Quiet { silence, .. }) = &self.quiet else { return until };
-        let is_listening = silence.listened.phase() == ListenedPhase::Listening;
+        let is_listening = silence.listened.phase() == ListeningPhase::Listening;
         until.min(now + if is_listening { LOOK } else { LONG_LOOK })
     }
 }
@@ -103,9 +108,9 @@ impl Silence {
         self.carriers = carriers;
         match (carriers.contains(&true), self.listened.phase()) {
             // It still drives the segment that the cable leads to, as far as is known.
-            (false, ListenedPhase::Occupied(_)) => {}
-            (false, _) => self.listened.set(ListenedPhase::NoCarrier),
-            (true, ListenedPhase::NoCarrier) => self.listened.set(ListenedPhase::Listening),
+            (false, ListeningPhase::Occupied(_)) => {}
+            (false, _) => self.listened.set(ListeningPhase::NoCarrier),
+            (true, ListeningPhase::NoCarrier) => self.listened.set(ListeningPhase::Listening),
             (true, _) => {}
         }
     }
@@ -116,7 +121,7 @@ impl Silence {
         let Some(source) = address_of_sender(frame).filter(|_| is_late && has_commands(frame)) else { return };
         self.silent_since = now;
         if self.listened.foreign_frame().is_none() {
-            self.listened.set(ListenedPhase::Occupied(ForeignFrame { arrived_on, source }));
+            self.listened.set(ListeningPhase::Occupied(ForeignFrame { arrived_on, source }));
         }
     }
 
@@ -284,7 +289,7 @@ mod tests {
         sockets: Arc<Sockets>,
         world: Rc<RefCell<World>>,
         links: QuietLinks<Half>,
-        listened: Arc<Listened>,
+        listened: Arc<ListeningState>,
         passed_on: usize,
     }
 
@@ -292,7 +297,7 @@ mod tests {
         /// Frames arrive on the acyclic half or on the other one.
         fn new(is_acyclic: bool, carriers: [bool; 2]) -> Bench {
             let world = Rc::new(RefCell::new(World { carriers, ..World::default() }));
-            let listened = Arc::new(Listened::lasting(LISTEN));
+            let listened = Arc::new(ListeningState::lasting(LISTEN));
             let halves = [is_acyclic, !is_acyclic].map(|it| Half(world.clone(), it));
             let [acyclic, cyclic] = halves;
             let sockets = Arc::new(Sockets::default());
@@ -327,13 +332,13 @@ mod tests {
         for carriers in [[true, false], [false, true], [true, true]] {
             let mut bench = Bench::new(true, [false; 2]);
             bench.run(10_000);
-            assert_eq!((bench.sent(), bench.listened.phase()), (0, ListenedPhase::NoCarrier));
+            assert_eq!((bench.sent(), bench.listened.phase()), (0, ListeningPhase::NoCarrier));
             bench.world.borrow_mut().carriers = carriers;
             bench.run(250);
-            assert_eq!((bench.sent(), bench.listened.phase()), (0, ListenedPhase::Listening));
+            assert_eq!((bench.sent(), bench.listened.phase()), (0, ListeningPhase::Listening));
             assert_eq!(Link::ALL.map(|link| bench.links.carrier(link)), [Some(false); 2]);
             bench.run(1);
-            assert_eq!((bench.sent(), bench.listened.phase()), (1, ListenedPhase::Free));
+            assert_eq!((bench.sent(), bench.listened.phase()), (1, ListeningPhase::Free));
             assert_eq!(Link::ALL.map(|link| bench.links.carrier(link)), carriers.map(Some));
             bench.arrives(Link::Main, 0x10);
             assert_eq!(bench.passed_on, 1, "frames are for the engine from now on");
@@ -359,7 +364,7 @@ mod tests {
             }
             assert_eq!((bench.sent(), bench.passed_on), (0, 0));
             bench.run(10);
-            assert_eq!((bench.sent(), bench.listened.phase()), (1, ListenedPhase::Free));
+            assert_eq!((bench.sent(), bench.listened.phase()), (1, ListeningPhase::Free));
         }
     }
 
@@ -373,7 +378,7 @@ mod tests {
         assert_eq!(bench.sent(), 0);
         bench.world.borrow_mut().carriers = [false; 2];
         bench.run(1_000);
-        assert_eq!((bench.sent(), bench.listened.phase()), (0, ListenedPhase::NoCarrier));
+        assert_eq!((bench.sent(), bench.listened.phase()), (0, ListeningPhase::NoCarrier));
     }
 
     // covers: other-main-device
@@ -387,7 +392,7 @@ mod tests {
         bench.run(499);
         assert_eq!(bench.sent(), 0, "it was bound in the middle of the silence at the earliest");
         bench.run(2);
-        assert_eq!(bench.listened.phase(), ListenedPhase::Free);
+        assert_eq!(bench.listened.phase(), ListeningPhase::Free);
         let mut bench = Bench::new(true, [true; 2]);
         bench.run(200);
         bench.sockets.0.store(1, Ordering::Relaxed);
@@ -411,7 +416,7 @@ mod tests {
         assert!(bench.listened.foreign_frame().is_some() && bench.sent() == 0);
         bench.world.borrow_mut().carriers = [true; 2];
         bench.run(251);
-        assert_eq!((bench.sent(), bench.listened.phase()), (1, ListenedPhase::Free));
+        assert_eq!((bench.sent(), bench.listened.phase()), (1, ListeningPhase::Free));
     }
 
     // covers: other-main-device
@@ -421,7 +426,7 @@ mod tests {
         let halves = [true, false].map(|it| Half(world.clone(), it));
         let [acyclic, cyclic] = halves;
         let mut links =
-            QuietLinks::new(acyclic, cyclic, Arc::new(Listened::not_shared()), Arc::new(Sockets::default()));
+            QuietLinks::new(acyclic, cyclic, Arc::new(ListeningState::not_shared()), Arc::new(Sockets::default()));
         links.send(Link::Main, &frame(0x10));
         assert_eq!(world.borrow().sent, 1);
     }

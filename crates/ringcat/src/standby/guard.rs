@@ -1,4 +1,4 @@
-//! A guard: a process that switches the interfaces of a MainDevice off when the program of that MainDevice dies or
+//! A guard: a process that switches the interfaces of a MainDevice off when the program of that MainDevice ends or
 //! hangs (protocol MR-21, REQ012).
 //!
 //! A process that is killed leaves its interfaces on. They forward nothing then, and the ACTIVE MainDevice of the ring
@@ -192,7 +192,7 @@ impl Drop for Guard {
 }
 
 /// Body of the guard: takes the order from the standard input, watches the process that has started it, and switches
-/// the interfaces off when that process dies or hangs. How it ended.
+/// the interfaces off when that process ends or hangs. Returns how it ended.
 ///
 /// # Errors
 /// The standard input is no socket, or the interfaces could not be switched off.

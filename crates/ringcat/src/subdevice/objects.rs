@@ -78,7 +78,7 @@ impl<S: Services> SubDevice<S> {
     }
 
     /// Writes an object of any size from `source`, piece by piece. It is called in the thread of the acyclic half, and
-    /// has to know its length.
+    /// must have a known length.
     pub fn sdo_write_from(
         self,
         object: SdoAddress,

@@ -1,5 +1,5 @@
-//! Hand-over of a segment between processes: the thread begins with what another process has known, and ends with what
-//! it knows.
+//! Hand-over of a segment between processes: the thread begins with the data of another process, and returns its own
+//! at its end.
 
 use std::sync::atomic::Ordering;
 use std::time::Duration;

@@ -123,7 +123,7 @@ const OF_A_DISTRIBUTION: [&str; 25] = [
 
 // covers: daemon
 #[test]
-fn all_files_come_to_the_places_of_a_distribution_and_nothing_is_left_of_them() {
+fn all_files_are_installed_in_the_places_of_a_distribution_and_removed_again() {
     let root = Root::new();
     let about = root.install(&["--prefix", "/usr"]);
     let expected: BTreeSet<String> = OF_A_DISTRIBUTION.iter().map(ToString::to_string).collect();
@@ -139,7 +139,7 @@ fn all_files_come_to_the_places_of_a_distribution_and_nothing_is_left_of_them() 
 
 // covers: daemon
 #[test]
-fn what_files_name_is_installed_with_every_prefix() {
+fn paths_in_installed_files_exist_with_every_prefix() {
     for (prefix, init, units) in [
         ("/usr", "systemd", "/usr/lib/systemd/system"),
         ("/usr/local", "systemd", "/usr/local/lib/systemd/system"),
@@ -166,7 +166,7 @@ fn what_files_name_is_installed_with_every_prefix() {
 
 // covers: daemon
 #[test]
-fn every_place_can_be_chosen() {
+fn each_directory_can_be_chosen() {
     let root = Root::new();
     let places = [
         ("--bindir", "ringcat"),
@@ -195,7 +195,7 @@ fn every_place_can_be_chosen() {
 
 // covers: daemon
 #[test]
-fn an_edited_configuration_outlives_a_new_version_and_a_removal_but_no_purge() {
+fn an_edited_configuration_survives_an_update_and_a_removal_but_not_a_purge() {
     let root = Root::new();
     root.install(&["--prefix", "/usr"]);
     let (conf, new) = ("/etc/ethercat.conf", "/etc/ethercat.conf.new");
@@ -220,7 +220,7 @@ fn an_edited_configuration_outlives_a_new_version_and_a_removal_but_no_purge() {
 
 // covers: daemon
 #[test]
-fn files_of_others_stay_and_those_of_an_older_version_go() {
+fn files_of_other_programs_stay_and_those_of_an_older_version_are_removed() {
     let root = Root::new();
     ["/usr/bin/other", "/usr/lib/udev/rules.d/other"].iter().for_each(|other| root.write(other, ""));
     root.install(&["--prefix", "/usr"]);
@@ -234,7 +234,7 @@ fn files_of_others_stay_and_those_of_an_older_version_go() {
 
 // covers: daemon
 #[test]
-fn configuration_of_others_is_neither_overwritten_nor_removed() {
+fn configuration_of_other_programs_is_neither_overwritten_nor_removed() {
     let root = Root::new();
     let (conf, limits) = ("/etc/ethercat.conf", "/etc/security/limits.d/ethercat.conf");
     [conf, limits].iter().for_each(|path| root.write(path, "of another master\n"));
@@ -259,7 +259,7 @@ fn configuration_of_others_is_neither_overwritten_nor_removed() {
 
 // covers: daemon
 #[test]
-fn what_was_replaced_by_others_since_stays_and_parts_that_are_not_renewed_too() {
+fn replaced_files_stay_and_so_do_parts_that_are_not_installed_again() {
     let root = Root::new();
     root.install(&["--prefix", "/usr"]);
     root.write("/usr/bin/ethercat", "the tool of another master\n");

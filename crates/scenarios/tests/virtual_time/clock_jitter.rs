@@ -89,7 +89,7 @@ fn sync0_stays_synchronous_through_cuts_with_a_host_50_us_late() {
 /// signals these SubDevices wait in SAFEOP.
 // covers: 7.2, 7.3, dc-late-host
 #[test]
-fn a_clock_without_sync_in_front_of_the_reference_delays_no_subdevice() {
+fn a_clock_without_sync_upstream_of_the_reference_delays_no_subdevice() {
     for (count, reference, closed) in [(3, 1, false), (3, 1, true), (12, 1, false), (12, 5, false), (12, 5, true)] {
         for front_has_sync in [false, true] {
             let text = format!("reference {reference} of {count}, ring {closed}, SYNC in front {front_has_sync}");
@@ -136,7 +136,7 @@ fn a_clock_without_sync_in_front_of_the_reference_delays_no_subdevice() {
 /// reference, so that they lock and are as exact as those behind, whatever the cycle.
 // covers: 7.2, 7.3, dc-reference
 #[test]
-fn clocks_in_front_of_the_reference_lock_and_are_exact_in_short_and_long_cycles() {
+fn clocks_upstream_of_the_reference_lock_and_are_exact_in_short_and_long_cycles() {
     // Clocks that differ by 190 ppm swing around the prediction (docs/dc.md, "What drift does to the loop").
     for (count, ppm, cycle_us) in [(2, 50, 1_000), (3, 50, 1_000), (10, 50, 250), (10, 50, 4_000), (3, 50, 4_000)] {
         for closed in [false, true] {

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use ringcat::config::network::Bytes;
 use ringcat::config::network::model::{Sdo, Startup};
-use ringcat::config::{Configuration, Difference, DifferenceKind, ExportOptions, FoundNetwork, Stated};
+use ringcat::config::{Configuration, Difference, DifferenceKind, ExportOptions, FoundNetwork, StatedProperties};
 use ringcat::eni::EniFile;
 use ringcat::network::{LoadedNetwork, NetworkFile, ScanOptions};
 use ringcat::simulated::SimulatedSegment;
@@ -36,7 +36,7 @@ fn exported(file: &NetworkFile) -> String {
 }
 
 /// The differences of a bus, whose marks are checked on the bus.
-fn checked(configuration: &Configuration, stated: &[Stated], bus: &str) -> Vec<Difference> {
+fn checked(configuration: &Configuration, stated: &[StatedProperties], bus: &str) -> Vec<Difference> {
     let (main_device, scan) = scanned(bus);
     let network = FoundNetwork::new(&scan.subdevices, &scan.topology);
     let differences = configuration.differences(network, stated);

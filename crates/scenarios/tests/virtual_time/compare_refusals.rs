@@ -6,7 +6,9 @@ use std::time::Duration;
 
 use ringcat::config::network::Bytes;
 use ringcat::config::network::model::{Clocks, Connection, Junctions, Lrw, Sdo, Startup, Sync};
-use ringcat::config::{Configuration, Difference, DifferenceKind, ExportOptions, FoundNetwork, LrwUse, Stated};
+use ringcat::config::{
+    Configuration, Difference, DifferenceKind, ExportOptions, FoundNetwork, LrwUse, StatedProperties,
+};
 use ringcat::eni::EniFile;
 use ringcat::esi::EsiDevices;
 use ringcat::network::{LoadedNetwork, NetworkFile, ScanOptions};
@@ -59,7 +61,12 @@ fn activated(
 }
 
 /// The differences of a bus, whose marks are checked on the bus.
-fn checked_of(configuration: &Configuration, stated: &[Stated], bus: &str, modules: &[Vec<u32>]) -> Vec<Difference> {
+fn checked_of(
+    configuration: &Configuration,
+    stated: &[StatedProperties],
+    bus: &str,
+    modules: &[Vec<u32>],
+) -> Vec<Difference> {
     let options = Options::default().with_junctions(configuration.rings.junctions);
     let (mut main_device, scan) = scanned(bus, &options);
     let mut not_closed = None;

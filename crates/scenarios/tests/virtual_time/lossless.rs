@@ -31,7 +31,7 @@ const EXPECTED: [(Duration, [usize; CYCLES.len()]); 4] = [
 ];
 /// The page with this table.
 const PAGE: &str = include_str!("../../../../docs/redundancy.md");
-/// Cycles until the ways of frames are known.
+/// Cycles until the round trips of frames are known.
 const LEARNING: u64 = 200;
 
 /// SubDevices without a mailbox: their outputs may be repeated.
@@ -87,9 +87,9 @@ fn edges(count: usize, detection: Duration, cycle: Duration, cables: &[usize], p
     let mut world = world(network, |scan| automatic(&scan.subdevices, cycle));
     world.evaluate_latched(false);
     world.compare_tries();
-    let wait = world.application().exchange().waits_for_ns().expect("the ways of frames are known");
+    let wait = world.application().exchange().waits_for_ns().expect("the round trips are known");
     let [flight, open] = ways(&mut world, count);
-    // The host learns one way in a closed ring: the open one is at most twice as long.
+    // The host measures one round trip in a closed ring: that of the open one is at most twice as long.
     assert!(wait > open && wait <= 2 * flight * 9 / 8 + 10_000, "r {wait} ns, {flight} ns closed, {open} ns open");
     let needed = detection.as_nanos() as u64 + 2 * flight + open * 9 / 8 + 10_000;
     let allowed = (needed.div_ceil(cycle.as_nanos() as u64) as usize).saturating_sub(1);
@@ -154,7 +154,7 @@ fn cuts_and_repairs_cost_no_cycle_where_the_time_fits() {
     }
 }
 
-/// As in the page.
+/// As on the page.
 fn shown(detection: Duration) -> String {
     let us = detection.as_micros();
     if us.is_multiple_of(1_000) { format!("{} ms", us / 1_000) } else { format!("{us} us") }
@@ -195,7 +195,7 @@ fn a_full_acyclic_half_leaves_the_time_of_a_second_try_free() {
         (0..LEARNING).for_each(|_| load.cycle(&mut world));
         assert_eq!(world.application().cyclic_counters().sent_again, 0, "nothing is lost");
         let (begun, before) = (world.now(), world.application().acyclic_counters().bytes);
-        let wait = world.application().exchange().waits_for_ns().expect("the ways of frames are known");
+        let wait = world.application().exchange().waits_for_ns().expect("the round trips are known");
         let cable = CableId(count / 2);
         for phase in 0..EDGES {
             for fault in [Fault::Cut(cable), Fault::Heal(cable)] {
@@ -269,7 +269,7 @@ fn a_host_that_is_late_now_and_then_still_sends_lost_frames_again() {
         let mut world =
             world(line(descriptions(&kinds(10)), NetworkOptions::default()), |scan| automatic(&scan.subdevices, MS));
         world.evaluate_latched(false);
-        let usual = world.application().exchange().waits_for_ns().expect("the ways of frames are known");
+        let usual = world.application().exchange().waits_for_ns().expect("the round trips are known");
         let mark = world.mark();
         for _ in 0..ROUNDS {
             for _ in 0..delays {

@@ -1,5 +1,5 @@
-//! Mail that belongs to no request of RingCAT: error replies beside Ethernet frames, types that only a gateway's client
-//! knows, vendor messages and emergencies that a SubDevice sends by itself.
+//! Mail that belongs to no request of RingCAT: error replies beside Ethernet frames, types for a gateway's client
+//! only, vendor messages and emergencies that a SubDevice sends by itself.
 
 use std::cell::Cell;
 use std::rc::Rc;

@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use ringcat::config::network::model::{CheckRevision, Entry, Protocol, Required, SubDevice};
-use ringcat::config::{Difference, DifferenceKind, ExportOptions, FoundNetwork, Stated};
+use ringcat::config::{Difference, DifferenceKind, ExportOptions, FoundNetwork, StatedProperties};
 use ringcat::eni::EniFile;
 use ringcat::network::{LoadedNetwork, NetworkFile, ScanOptions};
 use ringcat::simulated::SimulatedSegment;
@@ -340,7 +340,7 @@ fn of_eni(types: &[&str], change: fn(&mut NetworkFile)) -> Vec<(DifferenceKind, 
     let export = file.to_eni(&ExportOptions::default()).unwrap_or_else(|error| panic!("{error}"));
     let eni = EniFile::from_bytes(export.text.as_bytes()).unwrap_or_else(|error| panic!("{error}"));
     let (main_device, scan) = scanned(types);
-    let stated: Vec<Stated> = eni.stated();
+    let stated: Vec<StatedProperties> = eni.stated();
     let differences = eni.configuration.differences(found(&scan), &stated);
     let is_prevented = differences.iter().any(|it| it.prevents_op);
     assert_eq!(!is_prevented, reaches_op(main_device, eni.declaration(false)), "{differences:#?}");

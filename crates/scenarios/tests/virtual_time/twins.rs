@@ -1,4 +1,4 @@
-//! Undeclared SubDevices of the types of declared ones, in random disturbances: none gets the state of a declared one.
+//! Random disturbances of segments with undeclared SubDevices of declared types: none gets the state of a declared one.
 //!
 //! `SEED=0..300 cargo test -p scenarios --test virtual_time twins::seeds -- --nocapture` runs many random segments.
 
@@ -24,6 +24,7 @@ enum Disturbance {
     Drop { cable: usize, count: u32 },
 }
 
+/// A segment with declared and undeclared SubDevices of the same types.
 struct Twins {
     world: World,
     declared: Vec<bool>,
@@ -165,7 +166,7 @@ const DECLARED: [[bool; 3]; 4] = [[false, true, true], [true, false, true], [tru
 /// As with one supply for several terminals: an undeclared one may come back first.
 // covers: identity
 #[test]
-fn an_undeclared_twin_that_comes_back_first_does_not_take_the_place_of_another() {
+fn an_undeclared_subdevice_that_returns_first_is_not_taken_for_a_declared_one() {
     for (declared, is_ring) in DECLARED.into_iter().flat_map(|it| [false, true].map(|is_ring| (it, is_ring))) {
         for (with_idle, later_ms) in [(true, 0), (false, 40), (true, 40), (true, 700)] {
             let mut twins = behind_a_coupler(is_ring, declared, with_idle);
@@ -188,7 +189,7 @@ fn an_undeclared_twin_that_comes_back_first_does_not_take_the_place_of_another()
 /// An undeclared one that has just come back is not read yet when a member is lost.
 // covers: identity
 #[test]
-fn a_twin_that_is_still_read_does_not_take_the_place_of_a_lost_subdevice() {
+fn an_undeclared_subdevice_that_is_still_read_is_not_taken_for_a_lost_one() {
     for (declared, is_ring) in DECLARED.into_iter().flat_map(|it| [false, true].map(|is_ring| (it, is_ring))) {
         for after_ms in [0, 1, 2, 4, 8, 15, 30] {
             let mut twins = behind_a_coupler(is_ring, declared, after_ms % 2 == 0);

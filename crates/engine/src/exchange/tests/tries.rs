@@ -6,11 +6,11 @@ use super::*;
 use crate::layout::RepeatRule;
 
 const FLIGHT: Duration = Duration::from_micros(20);
-/// More than the cycles after which the ways of frames are known.
+/// More than the cycles after which the round trips of frames are known.
 const LEARNING: u64 = 200;
 
-/// Domains of one input byte each on one link, with these periods in milliseconds, that send lost frames again. They
-/// have learned how long their frames take.
+/// Domains of one input byte each on one link, with these periods in milliseconds, that send lost frames again. The
+/// round trips of their frames are known.
 fn learned(periods: &[u64]) -> Ring {
     let spec = |(subdevice, period): (usize, &u64)| {
         let direction = Direction::Inputs;
@@ -87,7 +87,7 @@ impl Ring {
 // covers: lost-frames
 #[test]
 fn a_domain_without_a_period_is_sent_again_if_it_is_back_before_the_next_send() {
-    // One wait of 32.5 us or two, and another flight.
+    // One wait of 32.5 us or two, and another round trip.
     for (next_us, tries) in [(40, 0), (60, 1), (90, 2)] {
         let mut ring = learned(&[0]);
         assert_eq!(ring.lose(1, Duration::from_micros(next_us)), tries, "next send after {next_us} us");

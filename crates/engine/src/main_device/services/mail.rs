@@ -61,21 +61,21 @@ impl MainDevice {
     /// MainDevice is active. It may be created before or after activation, and its address is resolved at each use; it
     /// ends when it is dropped.
     pub fn create_sdo_request(&mut self, subdevice: impl Into<Address>, size: usize) -> SdoRequest {
-        let (request, served) = SdoRequest::new(subdevice.into(), size, self.requests.bell());
+        let (request, served) = SdoRequest::new(subdevice.into(), size, self.requests.request_counter());
         self.requests.add(served);
         request
     }
 
     /// A request for registers of a SubDevice of up to `size` bytes; as [`MainDevice::create_sdo_request`].
     pub fn create_register_request(&mut self, subdevice: impl Into<Address>, size: usize) -> RegisterRequest {
-        let (request, served) = RegisterRequest::new(subdevice.into(), size, self.requests.bell());
+        let (request, served) = RegisterRequest::new(subdevice.into(), size, self.requests.request_counter());
         self.requests.add(served);
         request
     }
 
     /// A request for IDNs of a SubDevice of up to `size` bytes; as [`MainDevice::create_sdo_request`].
     pub fn create_soe_request(&mut self, subdevice: impl Into<Address>, size: usize) -> SoeRequest {
-        let (request, served) = SoeRequest::new(subdevice.into(), size, self.requests.bell());
+        let (request, served) = SoeRequest::new(subdevice.into(), size, self.requests.request_counter());
         self.requests.add(served);
         request
     }
@@ -83,7 +83,7 @@ impl MainDevice {
     /// A handler of vendor messages of a SubDevice of up to `size` bytes; as
     /// [`MainDevice::create_sdo_request`].
     pub fn create_voe_handler(&mut self, subdevice: impl Into<Address>, size: usize) -> VoeHandler {
-        let (handler, served) = VoeHandler::new(subdevice.into(), size, self.requests.bell());
+        let (handler, served) = VoeHandler::new(subdevice.into(), size, self.requests.request_counter());
         self.requests.add(served);
         handler
     }

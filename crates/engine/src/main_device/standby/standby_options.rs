@@ -16,8 +16,8 @@ pub struct StandbyOptions {
     pub goes_through_init: bool,
     /// Most acyclic master frames per cycle, with Ethernet frames between both MainDevices
     /// ([`partner_endpoint`](super::super::MainDevice::partner_endpoint)); at most 16 (protocol AC-03). 0 by default:
-    /// no Ethernet. The ACTIVE sends as many as its own options allow, and only if those of the other one are not 0 it
-    /// is answered.
+    /// no Ethernet. The ACTIVE sends as many as its own options allow; the INACTIVE answers only if its own value is
+    /// not 0.
     pub max_acyclic: u8,
 }
 

@@ -193,7 +193,7 @@ impl MainDevice {
         let data = SegmentData { mailboxes, cache: self.cache.clone(), statistics };
         self.segment = self.segment.without_application(&bus).with_application(&bus, board.clone(), data);
         self.supervisor.attach(board);
-        self.supervisor.attach_bell(self.requests.bell().clone());
+        self.supervisor.attach_request_counter(self.requests.request_counter().clone());
     }
 
     /// The SubDevices as the previous ACTIVE has seen them last.

@@ -21,7 +21,7 @@ const STEPS: usize = 50;
 
 /// Makes some steps, unless the segment changes meanwhile.
 pub(super) async fn slide(bus: &Bus, segment: &SharedSegment, ring_changes: u32) {
-    // Before, the exchange does not know of which shift the steps are.
+    // Before, the exchange cannot assign the steps to a shift.
     let is_known = segment.board.clocks.times.taken() == segment.board.clocks.references().1;
     if !segment.view().clocks().is_slide_left() || !is_known {
         return;

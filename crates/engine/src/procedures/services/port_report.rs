@@ -96,7 +96,7 @@ pub struct SubDevicePorts {
     pub ports: [PortReport; 4],
     /// Delay from the reference clock in nanoseconds; before an application is active, and without distributed clocks,
     /// from the first SubDevice with a clock. `None` without a clock, or if it is not known: with rings behind
-    /// junctions that the scan does not know, behind forks without a clock, on the other link than the first clock, and
+    /// junctions that the scan has not found, behind forks without a clock, on the other link than the first clock, and
     /// while the segment changes.
     pub delay_ns: Option<i64>,
     /// EPU_ERROR_COUNTER (0x030C); `None` if it does not answer.

@@ -1,6 +1,6 @@
 //! Whole EEPROMs as they were read, for the next request.
 //!
-//! An image is shown again only where the EEPROM is certainly unchanged. Each read or write of an EEPROM, from either
+//! An image is used again only if the EEPROM is proved to be unchanged. Each read or write of an EEPROM, from either
 //! side of the controller, changes the address register of its SII interface, and a start clears it. After each read
 //! the registers of address and data therefore get a number that no other image has, the mark. While the mark is there
 //! the interface has had no command since. Vendor, product, revision, serial number and the words that the controller
@@ -229,7 +229,7 @@ mod tests {
             images.keep(StationAddress(number), mark, image(MOST_BYTES / 16));
         }
         assert!((0..16).all(|number| images.of(StationAddress(number)).is_some()));
-        // It was asked for again.
+        // It was requested again.
         images.keep(StationAddress(0), mark, image(MOST_BYTES / 16));
         images.keep(StationAddress(16), mark, image(2));
         let there: Vec<u16> = (0..17).filter(|number| images.of(StationAddress(*number)).is_some()).collect();

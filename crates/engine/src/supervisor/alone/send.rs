@@ -28,7 +28,7 @@ impl Shared {
             self.end_alone();
         };
         let silent = no_return | self.silence.mask(self.now);
-        if self.flights.are_under_way(self.links, silent) {
+        if self.sent_frames.are_under_way(self.links, silent) {
             return None;
         }
         let departures = match &self.board {

@@ -1,7 +1,7 @@
 //! SIIs, and the progress of long transfers.
 
 use ringcat_control::message::Answer;
-use ringcat_control::tool::{MOST_IMAGES, MOST_TRANSFERS, SiiLine, ToolAnswer, TransferLine, TransferWork};
+use ringcat_control::tool::{MAX_IMAGES, MAX_TRANSFERS, SiiLine, ToolAnswer, TransferLine, TransferWork};
 use ringcat_engine::{TransferKind, TransferProgress};
 use ringcat_wire::address::Position;
 
@@ -14,8 +14,8 @@ use crate::supervisor_thread::SupervisorThread;
 /// SIIs of several SubDevices, at the same time. If the bus passes to another process meanwhile, the query as a whole
 /// ends, and is sent again to the next one.
 pub(super) fn images(supervisor: &SupervisorThread, positions: &[u16]) -> Answered {
-    if positions.len() > MOST_IMAGES {
-        return Err(expected(&format!("at most {MOST_IMAGES} SubDevices, not {}", positions.len())));
+    if positions.len() > MAX_IMAGES {
+        return Err(expected(&format!("at most {MAX_IMAGES} SubDevices, not {}", positions.len())));
     }
     // Each read of an EEPROM that is never kept takes its time once more.
     if (1..positions.len()).any(|at| positions[..at].contains(&positions[at])) {
@@ -45,7 +45,7 @@ pub(super) fn images(supervisor: &SupervisorThread, positions: &[u16]) -> Answer
 /// Progress of the transfers of a SubDevice.
 pub(super) fn transfers(supervisor: &SupervisorThread, position: u16) -> Result<Vec<TransferLine>, Error> {
     let transfers = supervisor.act(move |engine| engine.transfers(Position(position)))?;
-    Ok(transfers.into_iter().filter_map(line).take(MOST_TRANSFERS).collect())
+    Ok(transfers.into_iter().filter_map(line).take(MAX_TRANSFERS).collect())
 }
 
 fn line(progress: TransferProgress) -> Option<TransferLine> {

@@ -70,7 +70,7 @@ impl Order {
         Ok(Order { heartbeat: Heartbeat::adopt(memory)?, limit: Duration::from_nanos(limit_ns), interfaces })
     }
 
-    /// Watches a process until it releases the guard, dies or hangs. `end` is readable when it has ended; where the
+    /// Watches a process until it releases the guard, ends or hangs. `end` is readable when it has ended; where the
     /// system has none, the end of the stream shows it.
     pub(super) fn watch(&self, stream: &UnixStream, end: Option<&OwnedFd>) -> Ending {
         let interval = (self.limit / LOOKS_PER_LIMIT).max(SHORTEST_LOOK);

@@ -274,7 +274,7 @@ fn a_failed_subdevice_that_restarts_unseen_is_found_and_brought_to_preop() {
     }
 }
 
-/// A measurement of delays whose frames are lost asks for pauses; the last cycles do not wait for them.
+/// A measurement of delays whose frames are lost requests pauses; the last cycles do not wait for them.
 // covers: api, stop, dc-delays
 #[test]
 fn a_deactivation_keeps_its_limit_while_a_measurement_loses_its_frames() {

@@ -104,7 +104,7 @@ fn a_dictionary_that_cannot_be_read_is_tried_again_with_the_next_attempt() {
     assert_eq!(idle.segment.found().unwrap().subdevices[1].pdo_source, PdoSource::Outdated);
 }
 
-/// It may come back with its station address, and with what the last scan knows of it.
+/// It may come back with its station address, and with the data of the last scan.
 #[test]
 fn pdos_written_by_mail_before_a_subdevice_left_are_noted_in_the_last_scan() {
     let source = |idle: &Idle| idle.segment.found().unwrap().subdevices[1].pdo_source;

@@ -33,7 +33,7 @@ pub(super) struct SentDatagram {
 
 /// A frame on the wire.
 #[derive(Debug)]
-pub(super) struct Flight {
+pub(super) struct SentFrame {
     pub sequence: Sequence,
     pub datagrams: Vec<SentDatagram>,
     /// The first copy, with later ones merged in; before the first copy, the frame as sent.
@@ -45,19 +45,19 @@ pub(super) struct Flight {
     pub deadline: Instant,
     /// Bytes of its mailbox reads, while it is on the wire.
     pub reads: usize,
-    /// All datagrams are answered; the flight is kept to recognise the second copy.
+    /// All datagrams are answered; the frame is kept to recognise the second copy.
     pub answered: bool,
     /// All its datagrams may be repeated.
     pub repeatable: bool,
     /// Links on which copies are known not to return, a bit each.
     pub no_return: u8,
-    /// No further copy is awaited because its link is silent: the flight does not count against the window.
+    /// No further copy is awaited because its link is silent: the frame does not count against the window.
     pub released: bool,
 }
 
-impl Default for Flight {
-    fn default() -> Flight {
-        Flight {
+impl Default for SentFrame {
+    fn default() -> SentFrame {
+        SentFrame {
             sequence: Sequence::default(),
             datagrams: Vec::new(),
             bytes: Vec::new(),
@@ -74,8 +74,8 @@ impl Default for Flight {
     }
 }
 
-impl Flight {
-    /// A new, empty flight in the same memory.
+impl SentFrame {
+    /// A new, empty frame in the same memory.
     pub fn begin(&mut self, sequence: Sequence) {
         self.sequence = sequence;
         self.datagrams.clear();
@@ -102,7 +102,7 @@ impl Flight {
 
     /// Its mailbox reads.
     pub fn mail_reads(&self) -> impl Iterator<Item = Overdue> {
-        let Flight { sequence, sent_at, .. } = *self;
+        let SentFrame { sequence, sent_at, .. } = *self;
         self.datagrams.iter().filter_map(move |datagram| {
             let SentDatagram { header_at, length, mail, .. } = *datagram;
             Some(Overdue { sequence, header_at, length, station: mail?, sent_at })

@@ -23,7 +23,7 @@ pub trait ListeningSockets: fmt::Debug + Send + Sync {
 /// Whether a segment may be driven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum ListenedPhase {
+pub enum ListeningPhase {
     /// No link has a carrier: no frame can arrive.
     NoCarrier,
     /// Frames are listened for.
@@ -37,44 +37,44 @@ pub enum ListenedPhase {
 /// What has arrived on the links of a segment; shared with other threads, and kept while the segment passes from one
 /// process to another.
 #[derive(Debug)]
-pub struct Listened {
-    phase: Mutex<ListenedPhase>,
+pub struct ListeningState {
+    phase: Mutex<ListeningPhase>,
     lasts: Duration,
 }
 
-impl Default for Listened {
+impl Default for ListeningState {
     /// No frame has arrived yet.
-    fn default() -> Listened {
+    fn default() -> ListeningState {
         let random = RandomState::new().hash_one(0_u8);
         let spread = SPREAD.as_nanos() as u64;
-        Listened::lasting(LISTEN + Duration::from_nanos(random % spread))
+        ListeningState::lasting(LISTEN + Duration::from_nanos(random % spread))
     }
 }
 
-impl Listened {
+impl ListeningState {
     /// No frame has arrived yet; the listening takes this time.
-    pub fn lasting(lasts: Duration) -> Listened {
-        Listened { phase: Mutex::new(ListenedPhase::NoCarrier), lasts }
+    pub fn lasting(lasts: Duration) -> ListeningState {
+        ListeningState { phase: Mutex::new(ListeningPhase::NoCarrier), lasts }
     }
 
     /// A segment that nothing else can drive.
-    pub fn not_shared() -> Listened {
-        Listened { phase: Mutex::new(ListenedPhase::Free), lasts: Duration::ZERO }
+    pub fn not_shared() -> ListeningState {
+        ListeningState { phase: Mutex::new(ListeningPhase::Free), lasts: Duration::ZERO }
     }
 
-    fn lock(&self) -> MutexGuard<'_, ListenedPhase> {
+    fn lock(&self) -> MutexGuard<'_, ListeningPhase> {
         self.phase.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Whether the segment may be driven.
-    pub fn phase(&self) -> ListenedPhase {
+    pub fn phase(&self) -> ListeningPhase {
         *self.lock()
     }
 
     /// The first frame of the MainDevice that drives the segment.
     pub fn foreign_frame(&self) -> Option<ForeignFrame> {
         match self.phase() {
-            ListenedPhase::Occupied(frame) => Some(frame),
+            ListeningPhase::Occupied(frame) => Some(frame),
             _ => None,
         }
     }
@@ -82,22 +82,22 @@ impl Listened {
     /// Waits until the listening ends, up to this limit.
     pub fn wait(&self, limit: Duration) {
         let begin = Instant::now();
-        while self.phase() == ListenedPhase::Listening && begin.elapsed() < limit {
+        while self.phase() == ListeningPhase::Listening && begin.elapsed() < limit {
             std::thread::sleep(LOOK);
         }
     }
 
     /// An application drives the segment from now on.
     pub fn set_free(&self) {
-        self.set(ListenedPhase::Free);
+        self.set(ListeningPhase::Free);
     }
 
     /// Other links are used from now on.
     pub fn forget(&self) {
-        self.set(ListenedPhase::NoCarrier);
+        self.set(ListeningPhase::NoCarrier);
     }
 
-    pub(super) fn set(&self, phase: ListenedPhase) {
+    pub(super) fn set(&self, phase: ListeningPhase) {
         *self.lock() = phase;
     }
 

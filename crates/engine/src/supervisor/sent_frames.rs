@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 
 use ringcat_wire::frame::MAX_FRAME;
 
-use super::flight::Flight;
+use super::sent_frame::SentFrame;
 use crate::link::LinkSet;
 use crate::ring::{MAX_IN_FLIGHT, Sequence};
 use crate::time::Instant;
@@ -17,32 +17,32 @@ use crate::time::Instant;
 /// Frames on the wire at once: enough to fill the wire over the round trip of a thousand SubDevices (2 ms at 123 us a
 /// frame), few enough that no frame times out in a full transmit queue.
 const WINDOW: usize = 32;
-/// Flights are indexed by the lower bits of their sequence number.
+/// Frames are indexed by the lower bits of their sequence number.
 const SLOTS: usize = 128;
 
 const _: () = assert!(WINDOW <= MAX_IN_FLIGHT && MAX_IN_FLIGHT <= SLOTS);
 
-pub(crate) struct Flights {
-    slots: Vec<Option<Flight>>,
+pub(crate) struct SentFrames {
+    slots: Vec<Option<SentFrame>>,
     in_flight: usize,
     /// No deadline is earlier.
     earliest: Instant,
-    /// No flight that awaits repeatable replies was sent earlier.
+    /// No frame that awaits repeatable replies was sent earlier.
     oldest: Instant,
     /// When the newest frame was sent of which a copy has come back, by the link on which this was sent.
     newest_back: [Instant; 2],
-    /// Number of flights that no longer count against the window.
+    /// Number of frames that no longer count against the window.
     released: usize,
     sequence: Sequence,
-    /// Ended flights, kept for reuse of their memory.
-    spare: Vec<Flight>,
+    /// Ended frames, kept for reuse of their memory.
+    spare: Vec<SentFrame>,
     /// The frame being built, then its redundant copy.
     buffer: Box<[u8]>,
 }
 
-impl Flights {
-    pub(crate) fn new() -> Flights {
-        Flights {
+impl SentFrames {
+    pub(crate) fn new() -> SentFrames {
+        SentFrames {
             slots: (0..SLOTS).map(|_| None).collect(),
             in_flight: 0,
             earliest: Instant::NEVER,
@@ -60,7 +60,7 @@ impl Flights {
         self.sequence
     }
 
-    /// Takes the number of a frame that is sent beside the flights.
+    /// Takes the number of a frame that is not one of these.
     #[cfg(feature = "standby")]
     pub(super) fn take_sequence(&mut self) -> Sequence {
         self.sequence = self.sequence.next();
@@ -72,27 +72,27 @@ impl Flights {
         self.sequence = sequence;
     }
 
-    /// No flight has an earlier deadline; never if there is none. It may be that of an ended flight.
+    /// No frame has an earlier deadline; never if there is none. It may be that of an ended frame.
     #[inline]
     pub(super) fn next_deadline(&self) -> Instant {
         if self.in_flight == 0 { Instant::NEVER } else { self.earliest }
     }
 
-    /// A flight begins.
-    fn put(&mut self, flight: Flight) {
-        self.earliest = self.next_deadline().min(flight.deadline);
-        self.oldest = if self.in_flight == 0 { flight.sent_at } else { self.oldest.min(flight.sent_at) };
-        let slot = Flights::slot(flight.sequence);
-        self.slots[slot] = Some(flight);
+    /// A frame is sent.
+    fn put(&mut self, sent_frame: SentFrame) {
+        self.earliest = self.next_deadline().min(sent_frame.deadline);
+        self.oldest = if self.in_flight == 0 { sent_frame.sent_at } else { self.oldest.min(sent_frame.sent_at) };
+        let slot = SentFrames::slot(sent_frame.sequence);
+        self.slots[slot] = Some(sent_frame);
         self.in_flight += 1;
     }
 
-    /// Flights have ended or not: determines the earliest deadline, and when the oldest was sent.
+    /// Frames have ended or not: determines the earliest deadline, and when the oldest was sent.
     fn find_earliest(&mut self) {
-        let flights = self.slots.iter().flatten();
-        self.earliest = flights.clone().map(|flight| flight.deadline).min().unwrap_or(Instant::NEVER);
-        let repeatable = flights.filter(|flight| flight.awaits_repeatable());
-        self.oldest = repeatable.map(|flight| flight.sent_at).min().unwrap_or(Instant::NEVER);
+        let sent_frames = self.slots.iter().flatten();
+        self.earliest = sent_frames.clone().map(|sent_frame| sent_frame.deadline).min().unwrap_or(Instant::NEVER);
+        let repeatable = sent_frames.filter(|sent_frame| sent_frame.awaits_repeatable());
+        self.oldest = repeatable.map(|sent_frame| sent_frame.sent_at).min().unwrap_or(Instant::NEVER);
     }
 
     fn slot(sequence: Sequence) -> usize {
@@ -106,28 +106,29 @@ impl Flights {
 
     /// Whether copies of frames on the wire may still return, those on silent links excepted.
     pub(super) fn are_under_way(&self, links: LinkSet, silent: u8) -> bool {
-        let is_waited_for = |flight: &Flight| !flight.released && flight.missing_links(links) & !silent != 0;
+        let is_waited_for =
+            |sent_frame: &SentFrame| !sent_frame.released && sent_frame.missing_links(links) & !silent != 0;
         self.in_flight > self.released && self.slots.iter().flatten().any(is_waited_for)
     }
 
     fn release(&mut self, slot: usize) {
-        if let Some(flight) = self.slots[slot].as_mut().filter(|flight| !flight.released) {
-            flight.released = true;
+        if let Some(sent_frame) = self.slots[slot].as_mut().filter(|sent_frame| !sent_frame.released) {
+            sent_frame.released = true;
             self.released += 1;
         }
     }
 
-    /// Takes an ending flight from its slot.
-    fn take(&mut self, slot: usize) -> Option<Flight> {
-        let flight = self.slots[slot].take()?;
+    /// Takes an ending frame from its slot.
+    fn take(&mut self, slot: usize) -> Option<SentFrame> {
+        let sent_frame = self.slots[slot].take()?;
         self.in_flight -= 1;
-        self.released -= usize::from(flight.released);
-        Some(flight)
+        self.released -= usize::from(sent_frame.released);
+        Some(sent_frame)
     }
 
-    fn fresh(&mut self, sequence: Sequence) -> Flight {
-        let mut flight = self.spare.pop().unwrap_or_default();
-        flight.begin(sequence);
-        flight
+    fn fresh(&mut self, sequence: Sequence) -> SentFrame {
+        let mut sent_frame = self.spare.pop().unwrap_or_default();
+        sent_frame.begin(sequence);
+        sent_frame
     }
 }

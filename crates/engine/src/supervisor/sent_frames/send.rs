@@ -10,8 +10,8 @@ use ringcat_wire::source_address::MAX_RETRY;
 use crate::link::{Link, LinkSet};
 use crate::ring::identity::DATAGRAMS_AT;
 use crate::ring::{Class, Identity};
-use crate::supervisor::flight::{Flight, SentDatagram};
 use crate::supervisor::outbox::{Outbox, Rank};
+use crate::supervisor::sent_frame::{SentDatagram, SentFrame};
 use crate::supervisor::shared::Shared;
 use crate::supervisor::transfer::{Request, Rest, Stage, TransferId, WITNESS_BYTES};
 use crate::time::Instant;
@@ -23,29 +23,29 @@ impl Shared {
     /// Packs datagrams from the outbox into frames and sends them, within the budget and the window.
     pub(in crate::supervisor) fn transmit(&mut self, budget: usize, transmit: &mut impl FnMut(Link, &[u8])) -> usize {
         let mut used = self.send_debug_messages(budget, transmit);
-        while self.flights.has_room() && used < budget {
+        while self.sent_frames.has_room() && used < budget {
             let limit = (budget - used).min(MAX_FRAME);
-            let flight = match self.alone.is_held() {
+            let sent_frame = match self.alone.is_held() {
                 true => self.next_alone().and_then(|(id, no_return)| self.pack_alone(id, no_return)),
                 false if self.outbox.is_ready(self.now) => self.pack(limit),
                 false => None,
             };
-            let Some(flight) = flight else { break };
+            let Some(sent_frame) = sent_frame else { break };
             self.blocked = None;
-            used += flight.bytes.len();
+            used += sent_frame.bytes.len();
             self.counters.sent += 1;
-            self.counters.bytes += flight.bytes.len() as u64;
-            self.counters.datagrams += flight.datagrams.len() as u64;
+            self.counters.bytes += sent_frame.bytes.len() as u64;
+            self.counters.datagrams += sent_frame.datagrams.len() as u64;
             self.silence.sent(Link::Main, self.now);
-            self.events.messages().sent(self.now, Link::Main, &flight.bytes);
-            transmit(Link::Main, &flight.bytes);
+            self.events.messages().sent(self.now, Link::Main, &sent_frame.bytes);
+            transmit(Link::Main, &sent_frame.bytes);
             if self.links == LinkSet::Ring {
                 self.silence.sent(Link::Redundant, self.now);
-                let copy = &mut self.flights.buffer[..flight.bytes.len()];
-                copy.copy_from_slice(&flight.bytes);
+                let copy = &mut self.sent_frames.buffer[..sent_frame.bytes.len()];
+                copy.copy_from_slice(&sent_frame.bytes);
                 Identity::mark_redundant(copy, true);
-                adjust_auto_increment(copy, &flight.datagrams, self.main_count);
-                for datagram in &flight.datagrams {
+                adjust_auto_increment(copy, &sent_frame.datagrams, self.main_count);
+                for datagram in &sent_frame.datagrams {
                     let Some(transfer) = self.transfers.find(datagram.transfer) else { continue };
                     if let Some(station) = transfer.request.redundant_station {
                         let at = datagram.header_at + 2;
@@ -59,7 +59,7 @@ impl Shared {
                 self.events.messages().sent(self.now, Link::Redundant, copy);
                 transmit(Link::Redundant, copy);
             }
-            self.flights.put(flight);
+            self.sent_frames.put(sent_frame);
         }
         used
     }
@@ -72,13 +72,13 @@ impl Shared {
     }
 
     /// Builds one frame of at most `limit` bytes from the front of the outbox; `None` if nothing fits.
-    fn pack(&mut self, limit: usize) -> Option<Flight> {
-        let sequence = self.flights.sequence.next();
-        let mut flight = self.flights.fresh(sequence);
+    fn pack(&mut self, limit: usize) -> Option<SentFrame> {
+        let sequence = self.sent_frames.sequence.next();
+        let mut sent_frame = self.sent_frames.fresh(sequence);
         let mut retry = 0;
         let length = {
             let source = self.identity.source();
-            let mut builder = FrameBuilder::ethernet(&mut self.flights.buffer, MacAddress::ETHERCAT_GROUP, source)?;
+            let mut builder = FrameBuilder::ethernet(&mut self.sent_frames.buffer, MacAddress::ETHERCAT_GROUP, source)?;
             // `reserved`: for the rest of a group. Of one that is sent again, less may be left.
             let (mut total, mut datagrams, mut is_alone, mut reserved) = (DATAGRAMS_AT, 0, false, Rest::NONE);
             let reads = self.outbox.may_read(self.now);
@@ -103,13 +103,13 @@ impl Shared {
                 let has_room = reserved != Rest::NONE && group == reserved;
                 let count = if has_room { request.datagrams() } else { group.datagrams };
                 let fills_up = is_alone || request.before > 0 || datagrams + count > self.max_datagrams;
-                if fills_up && !flight.datagrams.is_empty() {
+                if fills_up && !sent_frame.datagrams.is_empty() {
                     break;
                 }
                 // Only the first datagram of a frame, with its group, may be longer than the window.
                 if !has_room
                     && (total + group.bytes).max(MIN_FRAME) > limit
-                    && (!flight.datagrams.is_empty() || !Shared::is_starved(&mut self.blocked, id, self.now))
+                    && (!sent_frame.datagrams.is_empty() || !Shared::is_starved(&mut self.blocked, id, self.now))
                 {
                     break;
                 }
@@ -119,55 +119,55 @@ impl Shared {
                 let bytes = request.bytes();
                 (total, datagrams) = (total + bytes, datagrams + request.datagrams());
                 retry = retry.max(transfer.retries);
-                flight.repeatable &= request.resend;
-                flight.datagrams.push(SentDatagram::new(id, request, data_at));
+                sent_frame.repeatable &= request.resend;
+                sent_frame.datagrams.push(SentDatagram::new(id, request, data_at));
                 transfer.stage = Stage::InFlight;
                 self.outbox.pop(rank);
                 if rank == Rank::Read {
-                    flight.reads += bytes;
+                    sent_frame.reads += bytes;
                     self.outbox.reads_sent(bytes);
                 }
             }
             builder.finish()
         };
-        self.launch(flight, length, retry)
+        self.launch(sent_frame, length, retry)
     }
 
     /// Builds a frame that holds one datagram.
-    fn pack_alone(&mut self, id: TransferId, no_return: u8) -> Option<Flight> {
-        let sequence = self.flights.sequence.next();
-        let mut flight = self.flights.fresh(sequence);
-        flight.no_return = no_return;
+    fn pack_alone(&mut self, id: TransferId, no_return: u8) -> Option<SentFrame> {
+        let sequence = self.sent_frames.sequence.next();
+        let mut sent_frame = self.sent_frames.fresh(sequence);
+        sent_frame.no_return = no_return;
         let length = {
             let source = self.identity.source();
-            let mut builder = FrameBuilder::ethernet(&mut self.flights.buffer, MacAddress::ETHERCAT_GROUP, source)?;
+            let mut builder = FrameBuilder::ethernet(&mut self.sent_frames.buffer, MacAddress::ETHERCAT_GROUP, source)?;
             let transfer = self.transfers.find(id)?;
             let (request, index) = (&transfer.request, sequence.index(Class::Acyclic));
             let data_at = builder.datagram(request.command, index, request.target, request.data.len())?;
             builder.data_mut(data_at, request.data.len())?.copy_from_slice(&request.data);
-            flight.datagrams.push(SentDatagram::new(id, request, data_at));
+            sent_frame.datagrams.push(SentDatagram::new(id, request, data_at));
             transfer.stage = Stage::InFlight;
             builder.finish()
         };
-        self.launch(flight, length, 0)
+        self.launch(sent_frame, length, 0)
     }
 
     /// Completes a frame of this length for sending; `None` if it is empty.
-    fn launch(&mut self, mut flight: Flight, length: usize, retry: u8) -> Option<Flight> {
-        let sequence = flight.sequence;
-        flight.bytes.extend_from_slice(&self.flights.buffer[..length]);
+    fn launch(&mut self, mut sent_frame: SentFrame, length: usize, retry: u8) -> Option<SentFrame> {
+        let sequence = sent_frame.sequence;
+        sent_frame.bytes.extend_from_slice(&self.sent_frames.buffer[..length]);
         // The retry index has three bits (protocol SM-04).
-        self.identity.stamp(&mut flight.bytes, sequence, retry.min(MAX_RETRY));
-        if flight.datagrams.is_empty() {
-            self.flights.spare.push(flight);
+        self.identity.stamp(&mut sent_frame.bytes, sequence, retry.min(MAX_RETRY));
+        if sent_frame.datagrams.is_empty() {
+            self.sent_frames.spare.push(sent_frame);
             return None;
         }
-        self.flights.sequence = sequence;
-        flight.sent_at = self.now;
-        let (begins, left_at) = self.outbox.hand_over(flight.bytes.len(), self.now);
-        flight.left_at = left_at;
-        flight.deadline = begins + self.round_trip.wait(retry);
-        Some(flight)
+        self.sent_frames.sequence = sequence;
+        sent_frame.sent_at = self.now;
+        let (begins, left_at) = self.outbox.hand_over(sent_frame.bytes.len(), self.now);
+        sent_frame.left_at = left_at;
+        sent_frame.deadline = begins + self.round_trip.wait(retry);
+        Some(sent_frame)
     }
 }
 

@@ -3,14 +3,14 @@
 use ringcat_wire::address::Wkc;
 use ringcat_wire::command::Command;
 
-use super::{Flights, SLOTS};
+use super::{SLOTS, SentFrames};
 use crate::link::Link;
 use crate::ring::FrameCopy;
-use crate::supervisor::flight::{Flight, SentDatagram};
 use crate::supervisor::outbox::Rank;
 use crate::supervisor::received::Received;
 use crate::supervisor::reply::{BusError, Reply};
 use crate::supervisor::round_trip::MAX_RETRIES;
+use crate::supervisor::sent_frame::{SentDatagram, SentFrame};
 use crate::supervisor::shared::Shared;
 use crate::supervisor::stray::Stray;
 use crate::supervisor::transfer::{Stage, TransferId};
@@ -20,68 +20,70 @@ impl Shared {
     pub(in crate::supervisor) fn receive(&mut self, copy: FrameCopy, arrived_on: Link, bytes: &[u8]) -> Received {
         self.silence.came_back(copy.sent_on);
         self.events.messages().received(self.now, arrived_on, bytes);
-        let slot = Flights::slot(copy.sequence);
-        let Some(flight) = self.flights.slots[slot].as_mut().filter(|flight| flight.sequence == copy.sequence) else {
+        let slot = SentFrames::slot(copy.sequence);
+        let Some(sent_frame) =
+            self.sent_frames.slots[slot].as_mut().filter(|sent_frame| sent_frame.sequence == copy.sequence)
+        else {
             self.round_trip.was_late();
             self.counters.late += 1;
             self.strays.late(copy.sequence, bytes, self.now);
             return Received::Late;
         };
-        if !flight.matches_sent(bytes) {
+        if !sent_frame.matches_sent(bytes) {
             self.counters.corrupt += 1;
             return Received::Corrupt;
         }
-        let first = flight.arrivals.arrived == 0;
-        if !flight.arrivals.note(copy.sent_on, arrived_on) {
+        let first = sent_frame.arrivals.arrived == 0;
+        if !sent_frame.arrivals.note(copy.sent_on, arrived_on) {
             self.counters.late += 1;
             return Received::Late;
         }
-        self.round_trip.took(self.now.ns_since(flight.sent_at));
-        self.outbox.note_round_trip(self.now.ns_since(flight.left_at));
+        self.round_trip.took(self.now.ns_since(sent_frame.sent_at));
+        self.outbox.note_round_trip(self.now.ns_since(sent_frame.left_at));
         for read in flight.second_reads() {
             if let Some(mail) = read.mail(bytes) {
                 self.strays.keep(read.station, Stray { mail, sent_at: read.sent_at });
             }
         }
-        flight.take(copy.sent_on, bytes, first);
-        let newest = &mut self.flights.newest_back[copy.sent_on.index()];
-        *newest = flight.sent_at.max(*newest);
-        let finished = flight.has_all_copies(self.links);
-        let enough = finished || flight.has_all_but(self.silence.mask(self.now) | flight.no_return, self.links);
+        sent_frame.take(copy.sent_on, bytes, first);
+        let newest = &mut self.sent_frames.newest_back[copy.sent_on.index()];
+        *newest = sent_frame.sent_at.max(*newest);
+        let finished = sent_frame.has_all_copies(self.links);
+        let enough = finished || sent_frame.has_all_but(self.silence.mask(self.now) | sent_frame.no_return, self.links);
         self.answer(slot, enough);
         if finished {
             self.end(slot);
         } else if enough {
-            self.flights.release(slot);
+            self.sent_frames.release(slot);
         }
         self.end_overtaken();
         Received::Taken
     }
 
-    /// Gives up frames whose copies do not come back because later ones have ([`Flight::is_overtaken`]). The margin of
-    /// a round trip covers ways that become shorter when a ring opens or closes.
+    /// Gives up frames whose copies do not come back because later ones have ([`SentFrame::is_overtaken`]). The margin
+    /// of a round trip covers paths that become shorter when a ring opens or closes.
     fn end_overtaken(&mut self) {
-        let (newest, margin) = (self.flights.newest_back, self.round_trip.longest());
-        if newest.into_iter().all(|newest| newest.ns_since(self.flights.oldest) <= margin) {
+        let (newest, margin) = (self.sent_frames.newest_back, self.round_trip.longest());
+        if newest.into_iter().all(|newest| newest.ns_since(self.sent_frames.oldest) <= margin) {
             return;
         }
         for slot in 0..SLOTS {
-            let is_overtaken = |flight: &Flight| flight.is_overtaken(newest, margin, self.links);
-            if self.flights.slots[slot].as_ref().is_some_and(is_overtaken) {
+            let is_overtaken = |sent_frame: &SentFrame| sent_frame.is_overtaken(newest, margin, self.links);
+            if self.sent_frames.slots[slot].as_ref().is_some_and(is_overtaken) {
                 self.expire(slot);
             }
         }
-        self.flights.find_earliest();
+        self.sent_frames.find_earliest();
     }
 
     /// Passes replies to procedures: those with the expected working counter at once, all others when no further copy
     /// is awaited. Replies of a frame that crossed a change of the ring count as lost.
     fn answer(&mut self, slot: usize, enough: bool) {
-        let Some(mut flight) = self.flights.slots[slot].take() else { return };
-        let ring_changed = flight.ring_changed_meanwhile();
-        let stamp = (flight.sequence, flight.sent_at);
+        let Some(mut sent_frame) = self.sent_frames.slots[slot].take() else { return };
+        let ring_changed = sent_frame.ring_changed_meanwhile();
+        let stamp = (sent_frame.sequence, sent_frame.sent_at);
         if enough && !ring_changed {
-            self.learn_main_count(&flight);
+            self.learn_main_count(&sent_frame);
         }
         for datagram in flight.datagrams.iter_mut().filter(|datagram| !datagram.answered) {
             let satisfied = datagram.satisfied();
@@ -90,34 +92,34 @@ impl Shared {
             }
             datagram.answered = true;
             if satisfied || !ring_changed {
-                let reply = datagram.reply(&flight.bytes, stamp, self.transfers.take_data(datagram.transfer));
+                let reply = datagram.reply(&sent_frame.bytes, stamp, self.transfers.take_data(datagram.transfer));
                 self.finish(datagram.transfer, Ok(reply));
             } else {
                 self.lost(datagram.transfer);
             }
         }
-        if !flight.answered && flight.datagrams.iter().all(|datagram| datagram.answered) {
-            flight.answered = true;
+        if !sent_frame.answered && sent_frame.datagrams.iter().all(|datagram| datagram.answered) {
+            sent_frame.answered = true;
             self.counters.received += 1;
-            self.outbox.reads_returned(core::mem::take(&mut flight.reads));
+            self.outbox.reads_returned(core::mem::take(&mut sent_frame.reads));
         }
-        self.flights.slots[slot] = Some(flight);
+        self.sent_frames.slots[slot] = Some(sent_frame);
     }
 
     /// Takes the number of SubDevices that process the main copy from a broadcast (protocol CR-09).
-    fn learn_main_count(&mut self, flight: &Flight) {
+    fn learn_main_count(&mut self, sent_frame: &SentFrame) {
         let is_broadcast = |datagram: &&SentDatagram| matches!(datagram.command, Command::Brd | Command::Bwr);
         // A working counter of 0 says nothing about the links.
         let answered = |datagram: &&SentDatagram| datagram.total() != Wkc(0);
-        if let Some(datagram) = flight.datagrams.iter().rfind(is_broadcast).filter(answered) {
+        if let Some(datagram) = sent_frame.datagrams.iter().rfind(is_broadcast).filter(answered) {
             self.main_count = datagram.wkc[Link::Main.index()].0;
         }
     }
 
     fn end(&mut self, slot: usize) {
-        let Some(flight) = self.flights.take(slot) else { return };
-        self.monitor.observe(flight.arrivals);
-        self.flights.spare.push(flight);
+        let Some(sent_frame) = self.sent_frames.take(slot) else { return };
+        self.monitor.observe(sent_frame.arrivals);
+        self.sent_frames.spare.push(sent_frame);
     }
 
     pub(in crate::supervisor) fn finish(&mut self, id: TransferId, result: Result<Reply, BusError>) {
@@ -138,54 +140,54 @@ impl Shared {
         due.into_iter().for_each(|wrong| self.report_command(wrong));
     }
 
-    /// Gives up flights after their deadline.
-    pub(in crate::supervisor) fn expire_flights(&mut self) {
-        if self.flights.next_deadline() > self.now {
+    /// Gives up frames after their deadline.
+    pub(in crate::supervisor) fn expire_sent_frames(&mut self) {
+        if self.sent_frames.next_deadline() > self.now {
             return;
         }
         for slot in 0..SLOTS {
-            let overdue = |flight: &Flight| flight.deadline <= self.now;
-            if self.flights.slots[slot].as_ref().is_some_and(overdue) {
+            let overdue = |sent_frame: &SentFrame| sent_frame.deadline <= self.now;
+            if self.sent_frames.slots[slot].as_ref().is_some_and(overdue) {
                 self.expire(slot);
             }
         }
-        self.flights.find_earliest();
+        self.sent_frames.find_earliest();
     }
 
     /// Completes the datagrams that one addressed SubDevice processed in the received copy (CR-06), and all datagrams
     /// if the missing copies were sent on silent links. All others count as lost: the addressed SubDevice may have
     /// processed the missing copy.
     fn expire(&mut self, slot: usize) {
-        let Some(flight) = self.flights.take(slot) else { return };
-        self.monitor.observe(flight.arrivals);
-        self.outbox.reads_returned(flight.reads);
-        flight.mail_reads().for_each(|read| self.strays.remember(read));
-        let missing = flight.missing_links(self.links);
+        let Some(sent_frame) = self.sent_frames.take(slot) else { return };
+        self.monitor.observe(sent_frame.arrivals);
+        self.outbox.reads_returned(sent_frame.reads);
+        sent_frame.mail_reads().for_each(|read| self.strays.remember(read));
+        let missing = sent_frame.missing_links(self.links);
         for link in Link::ALL.into_iter().filter(|link| missing & link.bit() != 0) {
             self.counters.copies_lost[link.index()] += 1;
-            self.counters.bytes_lost[link.index()] += flight.bytes.len() as u64;
+            self.counters.bytes_lost[link.index()] += sent_frame.bytes.len() as u64;
         }
-        if !flight.answered {
-            if flight.arrivals.arrived == 0 {
+        if !sent_frame.answered {
+            if sent_frame.arrivals.arrived == 0 {
                 self.counters.lost += 1;
             } else {
                 self.counters.half += 1;
             }
-            let enough = flight.has_all_but(self.silence.mask(self.now), self.links);
+            let enough = sent_frame.has_all_but(self.silence.mask(self.now), self.links);
             if enough {
-                self.learn_main_count(&flight);
+                self.learn_main_count(&sent_frame);
             }
             for datagram in flight.datagrams.iter().filter(|datagram| !datagram.answered) {
                 if enough || (datagram.is_answered_by_one() && !self.copies_differ(datagram.transfer)) {
-                    let stamp = (flight.sequence, flight.sent_at);
-                    let reply = datagram.reply(&flight.bytes, stamp, self.transfers.take_data(datagram.transfer));
+                    let stamp = (sent_frame.sequence, sent_frame.sent_at);
+                    let reply = datagram.reply(&sent_frame.bytes, stamp, self.transfers.take_data(datagram.transfer));
                     self.finish(datagram.transfer, Ok(reply));
                 } else {
                     self.lost(datagram.transfer);
                 }
             }
         }
-        self.flights.spare.push(flight);
+        self.sent_frames.spare.push(sent_frame);
     }
 
     /// Whether the copies of a datagram differ, so that neither can replace the other.

@@ -5,17 +5,17 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 /// Incremented by any thread; the acyclic half compares it at its next poll.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Bell(Arc<AtomicU32>);
+pub(crate) struct RequestCounter(Arc<AtomicU32>);
 
-impl Bell {
+impl RequestCounter {
     /// Increments the counter.
-    pub fn ring(&self) {
+    pub fn increment(&self) {
         self.0.fetch_add(1, Ordering::Release);
     }
 
     /// The counter; it wraps around.
     #[inline]
-    pub fn rung(&self) -> u32 {
+    pub fn value(&self) -> u32 {
         self.0.load(Ordering::Acquire)
     }
 }
