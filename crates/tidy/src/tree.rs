@@ -36,7 +36,7 @@ pub struct Tree {
 }
 
 /// Directories of the repository that are read.
-const ROOTS: [&str; 6] = [".ci", "ci", "crates", "docs", "examples", "fuzz"];
+const ROOTS: [&str; 7] = [".ci", "ci", "crates", "docs", "examples", "fuzz", "packaging"];
 
 /// Files at the root that are read.
 const AT_THE_ROOT: [&str; 7] =
@@ -45,8 +45,11 @@ const AT_THE_ROOT: [&str; 7] =
 /// Kinds of files that are read.
 const EXTENSIONS: [&str; 9] = ["c", "h", "map", "md", "py", "rs", "sh", "toml", "txt"];
 
-/// Directories whose files without an extension are scripts or Makefiles and are read too.
-const SCRIPTS: [&str; 3] = [".ci", "ci", "examples"];
+/// Scripts, and directories whose files without an extension are scripts or Makefiles, which are read too.
+const SCRIPTS: [&str; 5] = [".ci", "ci", "crates/ffi/install", "examples", "packaging"];
+
+/// All files of this directory are text and are read, whatever their extension is.
+const PACKAGING: &str = "packaging";
 
 impl Tree {
     /// Reads the repository that contains this crate.
@@ -100,7 +103,7 @@ fn collect(root: &Path, directory: &Path, files: &mut Vec<File>) -> io::Result<(
 
 fn is_read(root: &Path, path: &Path) -> bool {
     match path.extension() {
-        Some(extension) => EXTENSIONS.iter().any(|known| extension == *known),
+        Some(extension) => EXTENSIONS.iter().any(|known| extension == *known) || path.starts_with(root.join(PACKAGING)),
         None => SCRIPTS.iter().any(|directory| path.starts_with(root.join(directory))),
     }
 }
