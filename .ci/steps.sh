@@ -71,13 +71,12 @@ for line in sys.stdin:
 ' "$1"
 }
 
-# tries PROGRAM DIRECTORY [FILTER]: tests that do not hold have three tries. Each is shown at its end, and "FAILED"
-# stands behind what did not hold in the third: this machine may have stalled in those before. The output goes to a
-# file: a program that a failing test left behind would keep a pipe open, and the step would wait for it. A try has
-# 900 s.
+# tries PROGRAM DIRECTORY [FILTER]: tests that fail have three tries, because this machine may stall. The output of each
+# try is shown at its end, with "FAILED" in the third one only. The output goes to a file: a program that a failing test
+# has started would keep a pipe open, and the step would wait for it. A try has 900 s.
 tries() {
-    local program=$1 directory=$2 try status names=("${@:3}") mark='s/FAILED$/did not hold, and is tried again/
-        s/^failures:$/what did not hold:/; s/^test result: FAILED\./test result: tried again./'
+    local program=$1 directory=$2 try status names=("${@:3}") mark='s/FAILED$/failed in this try, and is tried again/
+        s/^failures:$/failed in this try:/; s/^test result: FAILED\./test result: tried again./'
     echo "running ${program##*/} in $directory"
     for try in 1 2 3; do
         [[ $try != 3 ]] || mark=
@@ -89,7 +88,7 @@ tries() {
         [[ $status != 124 && $status != 137 ]] || echo "stopped after 900 s"
         # The runner names at its end what failed.
         mapfile -t names < <(sed -n '/^failures:$/,/^test result/s/^    \([a-z0-9_:]*\)$/\1/p' "$logs/try" | sort -u)
-        echo "try $try of 3 did not hold: ${names[*]:-nothing was run}"
+        echo "try $try of 3 failed: ${names[*]:-nothing was run}"
         printf "${program##*/} %s\n" "${names[@]}" >>"$logs/failed-first"
         [[ ${#names[@]} != 0 ]] || return 1
         names=(--exact "${names[@]}")
@@ -98,13 +97,13 @@ tries() {
     return 1
 }
 
-# failed_first: prints the tests that failed at first and passed in another try, with the number of failures.
+# failed_first: prints the tests that failed in their first try, with the number of failures.
 failed_first() {
     if [[ ! -s $logs/failed-first ]]; then
         echo "each test passed in its first try"
         return
     fi
-    echo "tests that passed only in another try (failures, program, test):"
+    echo "tests that failed in their first try (failures, program, test):"
     sort "$logs/failed-first" | uniq -c
 }
 

@@ -89,7 +89,7 @@ EC_PUBLIC_API int ringcat_domain_send_again(ec_domain_t *domain, int on);
 
 /*
  * The time at which ecrt_master_receive() has to be called again, so that a frame that is lost by then is sent again:
- * in nanoseconds of CLOCK_MONOTONIC, UINT64_MAX if no frame is on the wire. A cycle then is: send; receive when frames
+ * in nanoseconds of CLOCK_MONOTONIC, UINT64_MAX if no frame is waited for. A cycle then is: send; receive when frames
  * usually are back; receive at this time, as long as it is before the next cycle; receive, process, queue. A real-time
  * thread may call it.
  *

@@ -152,7 +152,7 @@ impl Reporter {
         }
     }
 
-    /// The closing summary, with what did not hold.
+    /// The closing summary, with the failed checks.
     pub fn summary(&mut self, application: &Application<SimulatedSegment>, watch: &Watch, plan: &Plan) -> Verdict {
         self.say("\nsummary");
         self.totals(application);

@@ -22,7 +22,7 @@ and outputs as --set does.
 Ctrl-C ends it in order: outputs zero, all SubDevices to INIT; so do SIGTERM and
 SIGHUP. Exit status 0: all reached OP and stayed there, every cycle was
 complete, with two interfaces the ring is closed, and all clocks are locked
-where there are any. Otherwise 1, and the last line says what did not hold.
+where there are any. Otherwise 1, and the last line gives the reasons.
 
 Distributed clocks are in use with --clocks, or with any of --phase,
 --bus-shift, --reference, --estimate-delays and --sync; --for then counts from

@@ -1,4 +1,4 @@
-//! What did not hold while `ringcat run` exchanged process data, in words for its last line.
+//! Checks that failed while `ringcat run` exchanged process data, in words for its last line.
 
 use ringcat::text::Names;
 use ringcat::{AlState, ClockStatus, CyclicCounters, RingState, SubDeviceState};
@@ -37,7 +37,7 @@ impl Exchanged {
         }
     }
 
-    /// What did not hold; empty where everything held. Frames that several counters have counted are named once.
+    /// Failed checks; empty if all passed. Frames that several counters have counted are named once.
     pub fn reasons(&self, names: &Names) -> Vec<String> {
         let (before, after) = (&self.before.counters, &self.after.counters);
         let gained = |count: fn(&CyclicCounters) -> u64| count(after).saturating_sub(count(before));

@@ -80,7 +80,7 @@ fn late() -> bool {
             let name = format!("ring of {count}, after {} us", detection.as_micros());
             let worst = |at: usize| outcomes.iter().map(|outcome| outcome.incomplete[at]).max().unwrap_or_default();
             let bar = outcomes.iter().map(|outcome| outcome.allowed).min().unwrap_or_default() as f64;
-            figures.at_most(&format!("{name}: runs in which something did not hold"), failed as f64, 0.0, "runs");
+            figures.at_most(&format!("{name}: runs with a failed check"), failed as f64, 0.0, "runs");
             figures.at_most(&format!("{name}: incomplete cycles at a cut"), worst(0) as f64, bar, "cycles");
             figures.at_most(&format!("{name}: incomplete cycles at a repair"), worst(1) as f64, bar, "cycles");
         }
@@ -104,7 +104,7 @@ fn matrix() -> bool {
             &format!("{name}: runs"),
             format!("{} in {seconds:.0} s, {compared} bytes as in the twin", outcomes.len()),
         );
-        figures.at_most(&format!("{name}: runs in which something did not hold"), failed as f64, 0.0, "runs");
+        figures.at_most(&format!("{name}: runs with a failed check"), failed as f64, 0.0, "runs");
         let once = outcomes.iter().map(|outcome| outcome.taken).sum::<u64>();
         figures
             .show(&format!("{name}: outputs taken over once in a cycle"), format!("{once} times, and never otherwise"));
