@@ -141,7 +141,7 @@ const CAPABILITIES: [(&str, &[&str]); 7] = [
         &[
             "exchange/again",
             "exchange/tries",
-            "exchange/way",
+            "exchange/round_trip",
             "exchange/proved",
             "exchange/outcome",
             "exchange/flight/tries",
