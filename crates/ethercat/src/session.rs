@@ -31,7 +31,7 @@ pub struct Session<'a> {
     socket: &'a Path,
     client: Option<Client>,
     /// Second connection, for the progress of a transfer.
-    looker: Option<Client>,
+    second: Option<Client>,
     meanwhile: Option<Meanwhile>,
     /// Links of a bus without a daemon: no other bus is asked then.
     links: Option<String>,
@@ -54,8 +54,8 @@ impl<'a> Session<'a> {
         output: &'a mut dyn Write,
         errors: &'a mut dyn Write,
     ) -> Session<'a> {
-        let (client, looker, meanwhile) = (None, None, None);
-        Session { name, arguments, socket, client, looker, meanwhile, links: None, _standalone: None, output, errors }
+        let (client, second, meanwhile) = (None, None, None);
+        Session { name, arguments, socket, client, second, meanwhile, links: None, _standalone: None, output, errors }
     }
 
     /// On these links instead, which a daemon of this command drives from the first question on.
@@ -129,8 +129,8 @@ impl<'a> Session<'a> {
         if self.client.is_none() {
             let client = match &self.links {
                 Some(links) => {
-                    let Started { standalone, client, looker } = Standalone::start(links)?;
-                    (self._standalone, self.looker) = (Some(standalone), looker);
+                    let Started { standalone, client, second } = Standalone::start(links)?;
+                    (self._standalone, self.second) = (Some(standalone), second);
                     client
                 }
                 None => Client::connect(self.socket, "ethercat")?,
@@ -176,14 +176,14 @@ impl<'a> Session<'a> {
     pub fn ask_with_bar(&mut self, of: Transfer, ask: Query, bytes: Vec<u8>) -> Result<(Answer, Vec<u8>), Failure> {
         let is_wanted = !self.arguments.json && !self.arguments.quiet;
         self.client()?;
-        let Session { name, socket, client: Some(client), looker, errors, links, .. } = self else {
+        let Session { name, socket, client: Some(client), second, errors, links, .. } = self else {
             return Err(unexpected());
         };
         if !is_wanted || !progress::is_shown() {
             return Ok(client.ask_patiently(of.master, &ask, &bytes)?);
         }
         // The bus of this command has no other daemon.
-        let mut bar = Bar::new(name, of, links.is_none().then_some(*socket), looker);
+        let mut bar = Bar::new(name, of, links.is_none().then_some(*socket), second);
         let mut draw = || {
             bar.draw(errors);
             ControlFlow::Continue(())
