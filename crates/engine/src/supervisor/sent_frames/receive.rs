@@ -40,7 +40,7 @@ impl Shared {
         }
         self.round_trip.took(self.now.ns_since(sent_frame.sent_at));
         self.outbox.note_round_trip(self.now.ns_since(sent_frame.left_at));
-        for read in flight.second_reads() {
+        for read in sent_frame.second_reads() {
             if let Some(mail) = read.mail(bytes) {
                 self.strays.keep(read.station, Stray { mail, sent_at: read.sent_at });
             }
@@ -85,7 +85,7 @@ impl Shared {
         if enough && !ring_changed {
             self.learn_main_count(&sent_frame);
         }
-        for datagram in flight.datagrams.iter_mut().filter(|datagram| !datagram.answered) {
+        for datagram in sent_frame.datagrams.iter_mut().filter(|datagram| !datagram.answered) {
             let satisfied = datagram.satisfied();
             if !satisfied && !enough {
                 continue;
@@ -177,7 +177,7 @@ impl Shared {
             if enough {
                 self.learn_main_count(&sent_frame);
             }
-            for datagram in flight.datagrams.iter().filter(|datagram| !datagram.answered) {
+            for datagram in sent_frame.datagrams.iter().filter(|datagram| !datagram.answered) {
                 if enough || (datagram.is_answered_by_one() && !self.copies_differ(datagram.transfer)) {
                     let stamp = (sent_frame.sequence, sent_frame.sent_at);
                     let reply = datagram.reply(&sent_frame.bytes, stamp, self.transfers.take_data(datagram.transfer));
