@@ -1,8 +1,8 @@
 /*
- * A running light on a ring of two links, of which cables may be cut while it runs.
+ * A running light on a ring of two links whose cables may be cut while it runs.
  *
- * It takes every SubDevice that has the outputs of the first one, prints each change of the links and of the ring, and
- * at its end the number of cycles without complete process data. An argument limits the number of cycles of 1 ms. The
+ * It uses every SubDevice of the type of the first one, and prints each change of the links and of the ring, and at its
+ * end the number of cycles without complete process data. An argument limits the number of cycles of 1 ms. The
  * exit status is 0 only if no SubDevice left OP after all had reached it.
  */
 #include <errno.h>
@@ -31,7 +31,7 @@ static void end(int number)
     ended = 1;
 }
 
-/* Declares every SubDevice of the kind that is at position 0; 0 if all is right. */
+/* Declares every SubDevice of the type at position 0. Returns 0 if all calls succeed. */
 static int declare(void)
 {
     ec_master_info_t bus;

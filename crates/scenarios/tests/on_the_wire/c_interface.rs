@@ -9,9 +9,9 @@ use crate::bench::{Bench, await_op, program, target_directory};
 use crate::running::Running;
 use crate::states;
 
-/// What `examples/c/ring.c` takes: as many lights as it finds.
+/// Number of SubDevices with digital outputs; `examples/c/ring.c` uses all that it finds.
 const LIGHTS: usize = 6;
-/// A busy machine delays a change at most for so long.
+/// Longest delay of a change on a busy machine.
 const LONG: Duration = Duration::from_secs(30);
 /// A user without privileges.
 const USER: &str = "65534";
@@ -133,7 +133,7 @@ fn a_program_in_c_that_opens_two_interfaces_stays_in_op_in_a_cut_ring() {
     let light = Running::of(child);
     wait_for(&light, begin, "6 SubDevice(s) in OP.");
     wait_for(&light, begin, "The ring is closed.");
-    // The program has real-time scheduling, the threads that the library has started have not.
+    // The program has real-time scheduling, the threads that the library has started do not.
     let [own, others @ ..] = &policies(process)[..] else { panic!("it runs") };
     assert_eq!(*own, 1);
     assert!(!others.is_empty() && others.iter().all(|policy| *policy == 0), "{others:?}");
@@ -143,7 +143,7 @@ fn a_program_in_c_that_opens_two_interfaces_stays_in_op_in_a_cut_ring() {
 
 // covers: c-interface, daemon, ring-cut
 #[test]
-fn a_program_in_c_without_privileges_drives_the_ring_of_a_daemon_and_may_die() {
+fn a_program_in_c_without_privileges_drives_the_ring_of_a_daemon_until_killed() {
     let Some(mut bench) = Bench::new(2) else { return };
     let place = Place::with_the_example("c-daemon");
     bench.simulate(&segment(), true);

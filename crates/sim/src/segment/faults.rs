@@ -1,4 +1,4 @@
-//! Faults that a file orders for certain times.
+//! Faults of a segment file, at given times.
 
 use core::ops::Range;
 use core::time::Duration;
@@ -11,7 +11,7 @@ use super::format::{FaultEntry, File, duration, line};
 use crate::cable::{CableId, DeviceIndex};
 use crate::fault::Fault;
 
-/// No simulation lasts longer.
+/// Limit of the time of a fault.
 const YEAR: Duration = Duration::from_secs(365 * 86_400);
 
 /// All faults of the file, with the time since the beginning of the simulation.
