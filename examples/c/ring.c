@@ -82,7 +82,8 @@ static void show_ring(unsigned long number)
     ecrt_master_state(master, &state);
     if (were_in_op) {
         incomplete += now.wc_state != EC_WC_COMPLETE;
-        left_op += state.al_states != EC_AL_STATE_OP;
+        /* None in a cycle whose frames were lost. */
+        left_op += (state.al_states & ~(unsigned int) EC_AL_STATE_OP) != 0;
         if (now.redundancy_active != was_open)
             printf("%lu ms: The ring is %s.\n", number, now.redundancy_active ? "open" : "closed");
         was_open = now.redundancy_active;
