@@ -72,7 +72,8 @@ fn each_function_of_the_facts_has_a_comment_with_phases_and_what_it_returns() {
     let facts = include_str!("../facts/ecrt_symbol_versions.csv");
     let mut wrong = Vec::new();
     for (name, _) in facts.lines().skip(1).filter_map(|line| line.split_once(',')) {
-        let declared = header.match_indices(&format!("{name}(")).filter_map(|(at, _)| {
+        let call = format!("{name}(");
+        let declared = header.match_indices(&call).filter_map(|(at, _)| {
             let (before, line) = header[..at].rsplit_once('\n')?;
             line.strip_prefix("EC_PUBLIC_API ").map(|kind| (before, kind))
         });
