@@ -179,7 +179,7 @@ mod tests {
     /// A panic in the cycle leaves the application half changed: it is dropped at the release, not used.
     // covers: c-interface
     #[test]
-    fn a_panic_in_a_cyclic_call_ends_the_use_of_the_application_and_a_release_the_failure() {
+    fn a_panic_in_a_cyclic_call_ends_the_use_of_the_application_until_a_release() {
         let segment = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/c/services.toml");
         // SAFETY: the tests of this crate read variables by the standard library alone, which has a lock for them.
         unsafe { std::env::set_var("RINGCAT_SIM_71", segment) };

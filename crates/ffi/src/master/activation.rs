@@ -183,7 +183,12 @@ mod tests {
     fn two_hundred_refused_declarations_leave_no_memory_and_no_descriptor() {
         let master = declared(63);
         let address = |master: &Master| locked(&master.memory)[0].as_ptr();
-        let spoil = |is_spoiled| master.change(|draft| Ok(draft.spoil(is_spoiled)));
+        let spoil = |is_spoiled| {
+            master.change(|draft| {
+                draft.spoil(is_spoiled);
+                Ok(())
+            })
+        };
         spoil(true).expect("nothing is active");
         assert_eq!(master.activate(), Err(Code::INVALID));
         let (first, before) = (address(&master), descriptors());
