@@ -1,4 +1,4 @@
-/*
+/** @file
  * ringcat.h: what RingCAT adds to ecrt.h. Networks from a network file (docs/network-file.md of RingCAT) or from an ENI
  * of a configuration tool (docs/eni.md); lost frames that are sent again within their cycle (docs/redundancy.md).
  *
@@ -16,16 +16,16 @@
 extern "C" {
 #endif
 
-/* A variable of the file. Its domain has the byte at ecrt_domain_data(domain) + offset. */
+/** A variable of the file. Its domain has the byte at ecrt_domain_data(domain) + offset. */
 typedef struct {
     ec_domain_t *domain;
-    unsigned int offset; /* byte in the image of the domain */
-    unsigned int bit;    /* bit in this byte, 0 to 7 */
-    unsigned int bits;   /* number of bits */
-    int is_output;       /* 1: the program writes it */
+    unsigned int offset; /**< byte in the image of the domain */
+    unsigned int bit;    /**< bit in this byte, 0 to 7 */
+    unsigned int bits;   /**< number of bits */
+    int is_output;       /**< 1: the program writes it */
 } ringcat_variable_t;
 
-/*
+/**
  * Declares the network of a file, on a master that is requested and not active.
  *
  * Returns 0, or -EINVAL: the file cannot be read or is wrong, or it does not fit the bus (standard error has file, line
@@ -38,13 +38,13 @@ typedef struct {
  */
 EC_PUBLIC_API int ringcat_master_load_network(ec_master_t *master, const char *path);
 
-/*
+/**
  * The same with the contents of a network file in memory, of `size` bytes; it is read once. Returns as
  * ringcat_master_load_network(); -EFAULT: data is NULL. Messages name the file "network file in memory".
  */
 EC_PUBLIC_API int ringcat_master_load_network_data(ec_master_t *master, const void *data, size_t size);
 
-/*
+/**
  * Declares the network of an ENI. Returns as ringcat_master_load_network().
  *
  * Settings of the file that are not followed, or done in another way, are no error: standard error has a line for each
@@ -56,29 +56,29 @@ EC_PUBLIC_API int ringcat_master_load_network_data(ec_master_t *master, const vo
  */
 EC_PUBLIC_API int ringcat_master_load_eni(ec_master_t *master, const char *path);
 
-/*
+/**
  * The same with the contents of an ENI in memory, of `size` bytes; it is read once. Returns as
  * ringcat_master_load_network(); -EFAULT: data is NULL. Messages name the file "ENI in memory".
  */
 EC_PUBLIC_API int ringcat_master_load_eni_data(ec_master_t *master, const void *data, size_t size);
 
-/*
+/**
  * The SubDevice with a name in the file, the first one if several have it; NULL if there is none.
  * ecrt_master_slave_config() finds it, too.
  */
 EC_PUBLIC_API ec_slave_config_t *ringcat_master_subdevice(ec_master_t *master, const char *name);
 
-/* The domain with a name in the file; NULL if there is none. */
+/** The domain with a name in the file; NULL if there is none. */
 EC_PUBLIC_API ec_domain_t *ringcat_master_domain(ec_master_t *master, const char *name);
 
-/*
+/**
  * Finds the variable with a name in the file, as in "Drive.Feedback.Statusword"; the first one if several have it.
  *
  * Returns 0, or -ENOENT: there is none, or no domain exchanges it; -EPERM: not reserved; -EFAULT: NULL.
  */
 EC_PUBLIC_API int ringcat_master_variable(ec_master_t *master, const char *name, ringcat_variable_t *variable);
 
-/*
+/**
  * Lost frames of a domain are sent again within their cycle (1), or not (0, as without this call). The key of a network
  * file is `send_again`. The second try must be back before the next ecrt_master_send(), which is expected after the
  * time of ecrt_master_set_send_interval(); without it after the shortest period of the network file, or 1 ms.
@@ -87,7 +87,7 @@ EC_PUBLIC_API int ringcat_master_variable(ec_master_t *master, const char *name,
  */
 EC_PUBLIC_API int ringcat_domain_send_again(ec_domain_t *domain, int on);
 
-/*
+/**
  * The time at which ecrt_master_receive() has to be called again, so that a frame that is lost by then is sent again:
  * in nanoseconds of CLOCK_MONOTONIC, UINT64_MAX if no frame is waited for. A cycle then is: send; receive when frames
  * usually are back; receive at this time, as long as it is before the next cycle; receive, process, queue. A real-time

@@ -15,7 +15,7 @@ use crate::code::{Code, Outcome};
 const LONGEST_WAIT: Duration = Duration::from_secs(10);
 
 /// The application of a handle.
-type App = Application<AnyLinks, SupervisorThread>;
+pub type App = Application<AnyLinks, SupervisorThread>;
 
 /// The place of the application.
 #[derive(Debug, Default)]

@@ -16,7 +16,7 @@ use crate::any_links::{self, AnyLinks};
 use crate::code::{Code, Outcome, report, report_as};
 use crate::environment::{program_name, source};
 use crate::host::{HeldSignals, generation, memory_hint, variable};
-use crate::locks::locked;
+use crate::locks::{OfProcess, locked};
 use crate::responder::{DaemonResponder, Responder, code_of};
 
 /// Longest wait of a request for the scan.
@@ -27,7 +27,7 @@ const SILENCE: Duration = Duration::from_millis(300);
 const PAUSE: Duration = Duration::from_micros(500);
 /// Longest wait of a request while the master passes from one process to another.
 const CHANGE: Duration = Duration::from_secs(5);
-static BUSES: Mutex<Vec<Weak<Bus>>> = Mutex::new(Vec::new());
+static BUSES: OfProcess<Mutex<Vec<Weak<Bus>>>> = OfProcess::new();
 
 /// The bus of a master.
 #[derive(Debug)]
@@ -46,6 +46,7 @@ pub struct Bus {
     ownership: Option<OwnershipWatch>,
     responder: Arc<Responder>,
     is_reserved: AtomicBool,
+    is_abandoned: AtomicBool,
 }
 
 /// Why a daemon does not hand a bus over.
@@ -86,7 +87,7 @@ impl Bus {
     /// # Errors
     /// What is wrong, for the operator.
     pub fn open(master: u32) -> Result<Arc<Bus>, String> {
-        let mut buses = locked(&BUSES);
+        let mut buses = BUSES.lock();
         buses.retain(|bus| bus.strong_count() > 0);
         if let Some(bus) = buses.iter().filter_map(Weak::upgrade).find(|bus| bus.is(master)) {
             return Ok(bus);
@@ -103,7 +104,7 @@ impl Bus {
     pub fn take(responder: &DaemonResponder) -> Outcome<Arc<Bus>> {
         let begin = Instant::now();
         let bus = loop {
-            let mut buses = locked(&BUSES);
+            let mut buses = BUSES.lock();
             buses.retain(|bus| bus.strong_count() > 0);
             match Bus::of_daemon(responder.socket(), responder.master()) {
                 Ok(bus) => {
@@ -122,7 +123,12 @@ impl Bus {
     }
 
     fn is(&self, master: u32) -> bool {
-        self.master == master && self.generation == generation()
+        self.master == master && self.generation == generation() && !self.is_abandoned.load(Ordering::Acquire)
+    }
+
+    /// No further handle gets this bus: its links were lost with an application that failed.
+    pub fn abandon(&self) {
+        self.is_abandoned.store(true, Ordering::Release);
     }
 
     fn start(master: u32) -> Result<Bus, String> {
@@ -165,9 +171,19 @@ impl Bus {
         let _log = log.map_err(|error| format!("a thread cannot be started: {error}{}", memory_hint()))?;
         let cyclic_links = Mutex::new(Some(cyclic));
         let generation = generation();
-        let (responder, is_reserved) = (Arc::new(Responder::Here(supervisor.clone())), AtomicBool::new(false));
-        let _owned = Mutex::new(owned);
-        Ok(Bus { master, generation, _log, supervisor, cyclic_links, _owned, ownership, responder, is_reserved })
+        let responder = Arc::new(Responder::Here(supervisor.clone()));
+        Ok(Bus {
+            master,
+            generation,
+            _log,
+            supervisor,
+            cyclic_links,
+            _owned: Mutex::new(owned),
+            ownership,
+            responder,
+            is_reserved: AtomicBool::new(false),
+            is_abandoned: AtomicBool::new(false),
+        })
     }
 
     /// Number of the master.

@@ -1,4 +1,5 @@
-//! A value that one caller at a time uses. A second caller is refused at once: no lock, no waiting.
+//! A value that one caller at a time uses. A second caller is refused at once: no lock, no waiting. After a panic of a
+//! caller the value may be half changed: the claim is not given back, and every later caller is refused.
 
 use std::cell::UnsafeCell;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,56 +14,77 @@ const PAUSE: Duration = Duration::from_micros(50);
 #[derive(Debug)]
 pub struct Claim<T> {
     is_taken: AtomicBool,
+    /// A caller panicked: the claim stays taken.
+    has_failed: AtomicBool,
     value: UnsafeCell<T>,
 }
 
 // SAFETY: `use_now` gives a reference to one caller at a time: the atomic is taken with acquire order before, and given
-// back with release order after, also when the caller panics.
+// back with release order after. When the caller panics it is not given back.
 unsafe impl<T: Send> Sync for Claim<T> {}
 
-/// Gives the claim back.
-struct Taken<'a>(&'a AtomicBool);
+/// Dropped by a panic alone: marks the claim as failed.
+struct Failing<'a>(&'a AtomicBool);
 
-impl Drop for Taken<'_> {
+impl Drop for Failing<'_> {
     fn drop(&mut self) {
-        self.0.store(false, Ordering::Release);
+        self.0.store(true, Ordering::Release);
     }
 }
 
 impl<T> Claim<T> {
     /// A value that is not in use.
     pub const fn new(value: T) -> Claim<T> {
-        Claim { is_taken: AtomicBool::new(false), value: UnsafeCell::new(value) }
+        let (is_taken, has_failed) = (AtomicBool::new(false), AtomicBool::new(false));
+        Claim { is_taken, has_failed, value: UnsafeCell::new(value) }
     }
 
     /// Uses the value.
     ///
     /// # Errors
-    /// [`Code::BUSY`]: another caller uses it.
+    /// [`Code::BUSY`]: another caller uses it. [`Code::IO`]: a caller panicked.
     #[inline(always)]
     pub fn use_now<R>(&self, work: impl FnOnce(&mut T) -> R) -> Outcome<R> {
         if self.is_taken.swap(true, Ordering::Acquire) {
-            return Err(Code::BUSY);
+            return Err(self.refusal());
         }
-        let _taken = Taken(&self.is_taken);
-        // SAFETY: the swap made this caller the only one until `_taken` is dropped.
-        Ok(work(unsafe { &mut *self.value.get() }))
+        let failing = Failing(&self.has_failed);
+        // SAFETY: the swap made this caller the only one until the claim is given back below.
+        let result = work(unsafe { &mut *self.value.get() });
+        std::mem::forget(failing);
+        self.is_taken.store(false, Ordering::Release);
+        Ok(result)
+    }
+
+    #[cold]
+    fn refusal(&self) -> Code {
+        if self.has_failed.load(Ordering::Acquire) { Code::IO } else { Code::BUSY }
+    }
+
+    /// Takes the value out after a panic, half changed as it may be, and leaves another one, which may be used. `None`
+    /// if nothing has failed.
+    pub fn recover(&self, other: T) -> Option<T> {
+        self.has_failed.swap(false, Ordering::AcqRel).then(|| {
+            // SAFETY: the claim is taken still, and its taker has gone; of several callers the swap admits one.
+            let failed = std::mem::replace(unsafe { &mut *self.value.get() }, other);
+            self.is_taken.store(false, Ordering::Release);
+            failed
+        })
     }
 
     /// Uses the value; waits for another caller up to a limit. Not for the cyclic path.
     ///
     /// # Errors
-    /// [`Code::BUSY`]: another caller uses it all the time.
+    /// [`Code::BUSY`]: another caller uses it all the time. [`Code::IO`]: a caller panicked.
     pub fn use_within<R>(&self, limit: Duration, work: impl FnOnce(&mut T) -> R) -> Outcome<R> {
         let begin = Instant::now();
         let mut work = Some(work);
         loop {
             // Once the claim is given, there is work: it is taken only there.
-            if let Ok(Some(result)) = self.use_now(|value| work.take().map(|work| work(value))) {
-                return Ok(result);
-            }
-            if begin.elapsed() >= limit {
-                return Err(Code::BUSY);
+            match self.use_now(|value| work.take().map(|work| work(value))) {
+                Ok(Some(result)) => return Ok(result),
+                Err(code) if code != Code::BUSY || begin.elapsed() >= limit => return Err(code),
+                _ => {}
             }
             std::thread::sleep(PAUSE);
         }
@@ -83,6 +105,24 @@ mod tests {
         });
         assert_eq!(inner, Ok((Err(Code::BUSY), Err(Code::BUSY))));
         assert_eq!(claim.use_within(Duration::ZERO, |value| *value), Ok(2));
+    }
+
+    // covers: c-interface
+    #[test]
+    fn after_a_panic_the_value_is_refused_until_it_is_taken_out() {
+        let claim = Claim::new(1);
+        assert_eq!(claim.recover(0), None);
+        let panics = std::panic::AssertUnwindSafe(|| {
+            claim.use_now(|value| {
+                *value = 2;
+                panic!("half changed");
+            })
+        });
+        assert!(std::panic::catch_unwind(panics).is_err());
+        assert_eq!(claim.use_now(|value| *value), Err(Code::IO));
+        assert_eq!(claim.use_within(Duration::from_secs(60), |value| *value), Err(Code::IO));
+        assert_eq!((claim.recover(3), claim.recover(4)), (Some(2), None));
+        assert_eq!(claim.use_now(|value| *value), Ok(3));
     }
 
     // covers: c-interface

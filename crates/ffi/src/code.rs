@@ -1,11 +1,10 @@
 //! Return codes: negative error numbers of Linux, as `ecrt.h` gives them to C.
 
-use std::sync::OnceLock;
-
 use ringcat::daemon::{OperatorLines, Priority};
 
 use crate::environment::program_name;
 use crate::host::variable;
+use crate::locks::OfProcess;
 
 /// Why a call failed. The value is what C gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,7 +18,7 @@ impl Code {
     pub const NOT_RESERVED: Code = Code(-libc::EPERM);
     /// No such SubDevice, PDO, entry, or nothing is there.
     pub const NOT_FOUND: Code = Code(-libc::ENOENT);
-    /// A message or datagram was not answered.
+    /// A message or datagram was not answered, or the master has failed (a panic).
     pub const IO: Code = Code(-libc::EIO);
     /// There is no reference clock.
     pub const NO_CLOCK: Code = Code(-libc::ENXIO);
@@ -50,12 +49,7 @@ pub fn report(line: std::fmt::Arguments<'_>) {
 
 /// Writes a line for the operator to standard error, and to the journal where there is one. It never waits.
 pub fn report_as(priority: Priority, line: std::fmt::Arguments<'_>) {
-    static LINES: OnceLock<OperatorLines> = OnceLock::new();
-    let lines = LINES.get_or_init(|| OperatorLines::new(&program_name(), variable));
+    static LINES: OfProcess<OperatorLines> = OfProcess::new();
+    let lines = LINES.of(|| OperatorLines::new(&program_name(), variable));
     lines.write(priority, &format!("EtherCAT: {line}"));
-}
-
-/// The value that C gets.
-pub fn number(outcome: Outcome) -> i32 {
-    outcome.map_or_else(|Code(code)| code, |()| 0)
 }

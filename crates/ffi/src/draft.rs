@@ -35,9 +35,15 @@ impl Draft {
         self.found = found;
     }
 
-    /// Number of SubDevices of that scan.
-    pub fn found_count(&self) -> usize {
-        self.found.len()
+    /// Makes the declaration one that cannot be loaded, or repairs it.
+    #[cfg(test)]
+    pub fn spoil(&mut self, is_spoiled: bool) {
+        self.declaration.domains.iter_mut().for_each(|domain| domain.under_way = u8::from(!is_spoiled));
+    }
+
+    /// The SubDevices of that scan.
+    pub fn found(&self) -> &[SubDeviceInfo] {
+        &self.found
     }
 
     /// The index of a SubDevice with a name, if it was declared before.

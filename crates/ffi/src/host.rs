@@ -1,8 +1,7 @@
 //! The host: threads of the library, children of the process, and whether it runs with the rights of another user.
 
 use std::mem::MaybeUninit;
-use std::sync::Once;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 static GENERATION: AtomicU64 = AtomicU64::new(0);
 
@@ -19,12 +18,21 @@ extern "C" fn begin_generation() {
 
 /// From now on a child made by `fork` is a new generation.
 pub fn watch_forks() {
-    static WATCHED: Once = Once::new();
-    // SAFETY: the handler is a function of this library, which stays loaded (`-z nodelete`), and touches an atomic
-    // only.
-    WATCHED.call_once(|| unsafe {
-        libc::pthread_atfork(None, None, Some(begin_generation));
+    static IS_WATCHED: AtomicBool = AtomicBool::new(false);
+    once(&IS_WATCHED, || {
+        // SAFETY: the handler is a function of this library, which stays loaded (`-z nodelete`), and touches an atomic
+        // only.
+        unsafe { libc::pthread_atfork(None, None, Some(begin_generation)) };
     });
+}
+
+/// Registers something once, or twice where two threads do so at the same time. A `Once` that another thread has at a
+/// `fork` would never end in the child.
+fn once(is_done: &AtomicBool, register: impl FnOnce()) {
+    if !is_done.load(Ordering::Acquire) {
+        register();
+        is_done.store(true, Ordering::Release);
+    }
 }
 
 /// Signals of the calling thread are blocked until this is dropped. Threads that it starts inherit that.
@@ -51,12 +59,13 @@ impl Drop for HeldSignals {
     }
 }
 
-/// The process calls this function when it ends by `exit` or by a return of `main`. Only the first function counts.
+/// The process calls this function when it ends by `exit` or by a return of `main`: at least once. Only the first
+/// function counts.
 pub fn at_exit(end: extern "C" fn()) {
-    static REGISTERED: Once = Once::new();
-    // SAFETY: a function of this library, which stays loaded.
-    REGISTERED.call_once(|| unsafe {
-        libc::atexit(end);
+    static IS_REGISTERED: AtomicBool = AtomicBool::new(false);
+    once(&IS_REGISTERED, || {
+        // SAFETY: a function of this library, which stays loaded.
+        unsafe { libc::atexit(end) };
     });
 }
 

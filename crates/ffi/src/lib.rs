@@ -7,14 +7,15 @@
 //! | return codes, lines for the operator, structures of C | `code`, `types` |
 //! | links from the environment; the buses of this process | `environment`, `any_links`, `bus` |
 //! | questions, answered here or through a daemon | `responder` |
-//! | mutexes outside of the cyclic path | `locks` |
+//! | mutexes outside of the cyclic path; values of this process alone | `locks` |
 //! | settings of a SubDevice, a network file, the declaration under construction | `settings`, `network`, `draft` |
 //! | a handle of a master: reservation, activation, cyclic calls | `master`, `active`, `claim` |
 //! | words that any thread reads | `live`, `domain_words` |
 //! | requests of the cyclic thread, blocking transfers, information | `request`, `mailbox`, `information` |
 //! | the functions of C | `c` |
 //!
-//! `unsafe` is in `c` (pointers of C), `claim` (a value for one caller at a time) and `host` (calls of the system).
+//! `unsafe` is in `c` (pointers of C), `claim` (a value for one caller at a time), `locks` (values of a process) and
+//! `host` (calls of the system).
 //! docs/ecrt.md has each function with its return codes by phase.
 #![deny(unsafe_op_in_unsafe_fn)]
 

@@ -1,12 +1,12 @@
 //! Atomic words with which any thread reads the active application and sends it requests: no allocation, no waiting.
 
-use std::sync::RwLock;
+use std::sync::{PoisonError, RwLock};
 
 use ringcat::daemon::{OwnershipWatch, SegmentOverview};
 use ringcat::{Link, LiveStatus, RetryRequest, Services};
 
 use crate::bus::Bus;
-use crate::code::{Code, Outcome};
+use crate::code::{Code, Outcome, report};
 use crate::types::SegmentState;
 
 /// The words of the bus of a handle, while it has one.
@@ -29,13 +29,25 @@ pub struct Words {
 
 impl Live {
     /// From now on the words of this bus are read.
-    pub fn follow(&self, bus: &Bus, found: usize, is_ring: bool) {
-        let supervisor = bus.supervisor();
-        if let (Ok(status), Ok(retry), Ok(mut words)) =
-            (supervisor.live_status(), supervisor.create_retry_request(), self.0.write())
-        {
-            let found = u32::try_from(found).unwrap_or(u32::MAX);
-            *words = Some(Words { status, retry, found, is_ring, ownership: bus.ownership() });
+    ///
+    /// # Errors
+    /// [`Code::GONE`]: the acyclic half has ended, and there are no words any more. A line says so, unless the daemon
+    /// has taken the bus back, which has a line of its own.
+    pub fn follow(&self, bus: &Bus, found: usize, is_ring: bool) -> Outcome {
+        let (supervisor, ownership) = (bus.supervisor(), bus.ownership());
+        let asked = supervisor.live_status().and_then(|status| Ok((status, supervisor.create_retry_request()?)));
+        let found = u32::try_from(found).unwrap_or(u32::MAX);
+        let words = asked.map(|(status, retry)| Words { status, retry, found, is_ring, ownership });
+        let failed = words.as_ref().err().map(ToString::to_string);
+        *self.0.write().unwrap_or_else(PoisonError::into_inner) = words.ok();
+        match failed {
+            None => Ok(()),
+            Some(reason) => {
+                if bus.check_held().is_ok() {
+                    report(format_args!("master {}: the states of the slaves are not known: {reason}", bus.master()));
+                }
+                Err(Code::GONE)
+            }
         }
     }
 

@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use ringcat::daemon::{ClientError, SegmentOverview};
-use ringcat::{DomainId, LastOutputs, Link, ReferenceClock, Services, SubDeviceId};
+use ringcat::{LastOutputs, Link, ReferenceClock, Services, SubDeviceId};
 
 use crate::active::{Active, Slot};
 use crate::bus::Bus;
@@ -232,15 +232,16 @@ impl Master {
     /// Starts the application. It returns at once; SubDevices are configured while it cycles.
     ///
     /// # Errors
-    /// The handle has not reserved the bus, the declaration does not fit, or the daemon has taken the bus back.
+    /// The handle has not reserved the bus, the declaration does not fit, or the daemon has taken the bus back, also
+    /// that of an active application.
     pub fn activate(&self) -> Outcome {
         self.check_reserved()?;
+        let bus = self.bus()?;
+        bus.check_held()?;
         if self.is_active() {
             report(format_args!("the master is active already"));
             return Ok(());
         }
-        let bus = self.bus()?;
-        bus.check_held()?;
         self.refresh()?;
         let draft = locked(&self.draft);
         // Another thread may have released it meanwhile, which waits for the draft.
@@ -250,22 +251,10 @@ impl Master {
             report(format_args!("the master is active already"));
             return Ok(());
         }
-        let mut declaration = draft.declaration();
-        for (number, words) in draft.domains().iter().enumerate() {
-            let (domain, bytes) = (DomainId(number), words.bytes());
-            if bytes > 0 {
-                let memory = self.take_memory(bytes);
-                words.set_memory(memory.as_mut_ptr());
-                declaration.place_image(domain, memory);
-            }
-        }
         self.has_clock.store(draft.has_clock(), Ordering::Release);
-        let begun = self.begin(&bus, declaration, &draft);
-        match &begun {
-            Ok(()) => self.is_active.store(true, Ordering::Release),
-            Err(_) => draft.domains().iter().for_each(|words| words.set_memory(std::ptr::null_mut())),
-        }
-        begun
+        self.begin(&bus, &draft)?;
+        self.is_active.store(true, Ordering::Release);
+        Ok(())
     }
 
     /// Ends the application: all SubDevices go to PREOP, the declaration is empty again.
@@ -285,10 +274,7 @@ impl Master {
         let is_held = bus.check_held().is_ok();
         let limit = if is_held { END_LIMIT } else { Duration::ZERO };
         let mut draft = locked(&self.draft);
-        for (number, words) in draft.domains().iter().enumerate() {
-            words.set_memory(std::ptr::null_mut());
-            locked(&self.memory).extend(application.give_memory_back(DomainId(number)));
-        }
+        self.keep_memory(&draft, |domain| application.give_memory_back(domain));
         let ended = match application.deactivate(LastOutputs::Zero, limit) {
             Ok(ended) => ended,
             Err(refused) => {
@@ -303,8 +289,8 @@ impl Master {
         self.application_time.store(0, Ordering::Relaxed);
         *locked(&self.given) = GivenTimes::default();
         self.is_active.store(false, Ordering::Release);
-        self.live.follow(&bus, 0, false);
-        // Nothing is known of SubDevices once the acyclic half has ended.
+        // Nothing is known of SubDevices once the acyclic half has ended; a line says so.
+        let _ = self.live.follow(&bus, 0, false);
         draft.set_found(bus.found().unwrap_or_default());
         Ok(())
     }
@@ -322,6 +308,19 @@ impl Master {
         let access = std::mem::replace(&mut *locked(&self.access), Access::Released);
         if let (true, Access::Bus(bus)) = (was_reserved, access) {
             bus.unreserve();
+        }
+    }
+
+    /// Gives everything up after a panic. What the application has is dropped, not used: its SubDevices are left to the
+    /// daemon, or without one to their watchdogs.
+    pub fn abandon(&self) {
+        let was_reserved = self.is_reserved.swap(false, Ordering::AcqRel);
+        self.is_active.store(false, Ordering::Release);
+        let failed = self.application.recover(Slot::Empty);
+        drop(failed.or_else(|| self.application.use_within(CLAIM_LIMIT, std::mem::take).ok()));
+        let access = std::mem::replace(&mut *locked(&self.access), Access::Released);
+        if let (true, Access::Bus(bus)) = (was_reserved, access) {
+            bus.abandon();
         }
     }
 

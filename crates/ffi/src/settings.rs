@@ -245,6 +245,9 @@ impl Settings {
                 let pause = u64::try_from(value).map_err(|_| Code::INVALID)?;
                 self.wait_before_safeop = Duration::from_millis(pause);
             }
+            // For tests alone: no release has it.
+            #[cfg(debug_assertions)]
+            "RingcatTestPanic" => panic!("provoked by a test"),
             _ => report(format_args!("flag \"{}\" is unknown and has no effect", key.escape_debug())),
         }
         Ok(())

@@ -103,15 +103,16 @@ pub fn watch_peer(stream: &UnixStream, peer: &Peer) -> io::Result<Option<OwnedFd
 
 /// Raises the limit of descriptors of this process as far as it may, at most to this number. Returns the limit.
 pub fn raise_descriptors(wanted: u64) -> u64 {
-    let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+    // Of 64 bits on each processor.
+    let mut limit = libc::rlimit64 { rlim_cur: 0, rlim_max: 0 };
     // SAFETY: the pointer is to a live value.
-    if unsafe { libc::getrlimit(libc::RLIMIT_NOFILE, &mut limit) } < 0 {
+    if unsafe { libc::getrlimit64(libc::RLIMIT_NOFILE, &mut limit) } < 0 {
         return 0;
     }
     let before = limit.rlim_cur;
     limit.rlim_cur = before.max(wanted.min(limit.rlim_max));
     // SAFETY: the pointer is to a live value.
-    let raised = unsafe { libc::setrlimit(libc::RLIMIT_NOFILE, &limit) } == 0;
+    let raised = unsafe { libc::setrlimit64(libc::RLIMIT_NOFILE, &limit) } == 0;
     if raised { limit.rlim_cur } else { before }
 }
 

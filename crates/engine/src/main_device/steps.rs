@@ -29,7 +29,8 @@ use crate::segment::Found;
 use crate::topology::{Closing, NodeStatus};
 
 impl MainDevice {
-    /// First step: loads a declaration. It replaces a previously loaded one, with all added connections.
+    /// First step: loads a declaration. It replaces a previously loaded one, with all added connections. After an error
+    /// in the declaration nothing is loaded, and the memory of its images can be taken ([`MainDevice::unused_memory`]).
     ///
     /// # Errors
     /// [`ActivateError::NotPermitted`], and errors in the declaration alone.
@@ -40,13 +41,15 @@ impl MainDevice {
 
     /// As [`MainDevice::load`], once it is permitted.
     pub(super) fn load_permitted(&mut self, mut declaration: Declaration) -> Result<(), ActivateError> {
-        check(&declaration)?;
+        self.loaded = None;
         self.memories = Memories::of(&mut declaration)?;
+        check(&declaration)?;
         self.loaded = Some(Loaded { declaration, connections: Vec::new() });
         Ok(())
     }
 
-    /// Gives back the memory of a declaration that was loaded and not activated: after a failed activation.
+    /// Gives back the memory of a declaration that was not activated: after an error of [`MainDevice::load`] or of the
+    /// activation.
     pub fn unused_memory(&mut self, domain: DomainId) -> Option<&'static mut [u8]> {
         self.memories.0.get_mut(domain.0)?.take()
     }

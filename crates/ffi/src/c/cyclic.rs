@@ -4,7 +4,7 @@ use std::ffi::{c_int, c_uint};
 
 use ringcat::{DomainStatus, RingState};
 
-use super::handle::{alive, call};
+use super::handle::{ask, call};
 use super::memory::{list, put};
 use super::objects::{DomainObject, MasterObject, ec_domain_t, ec_master_t};
 use crate::active::Active;
@@ -65,13 +65,13 @@ unsafe extern "C" fn ecrt_domain_state(domain: *const ec_domain_t, state: *mut D
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_domain_size(domain: *const ec_domain_t) -> usize {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { alive(domain) }.map_or(0, |domain| domain.words.bytes())
+    unsafe { ask(domain, 0, |domain| domain.words.bytes()) }
 }
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_domain_data(domain: *const ec_domain_t) -> *mut u8 {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { alive(domain) }.map_or(std::ptr::null_mut(), |domain| domain.words.memory())
+    unsafe { ask(domain, std::ptr::null_mut(), |domain| domain.words.memory()) }
 }
 
 #[unsafe(no_mangle)]
@@ -186,9 +186,10 @@ unsafe extern "C" fn ecrt_master_sync_monitor_queue(master: *mut ec_master_t) ->
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_master_sync_monitor_process(master: *const ec_master_t) -> u32 {
+    let read = |MasterObject(owner): &MasterObject| {
+        let known = with_clock(&owner.master, |active| active.application.exchange().clock_spread_ns());
+        known.ok().flatten().unwrap_or(UNKNOWN)
+    };
     // SAFETY: a handle of the library (ecrt.h).
-    let read = unsafe { alive(master) }.and_then(|MasterObject(owner)| {
-        with_clock(&owner.master, |active| active.application.exchange().clock_spread_ns())
-    });
-    read.ok().flatten().unwrap_or(UNKNOWN)
+    unsafe { ask(master, UNKNOWN, read) }
 }

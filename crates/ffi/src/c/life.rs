@@ -2,44 +2,70 @@
 
 use std::ffi::{c_int, c_uint};
 use std::ptr::null_mut;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
-use super::handle::{alive, bury, call, ending, give};
+use super::guard::caught;
+use super::handle::{Ending, alive, alive_or_failed, ask, bury, call, ending, give};
 use super::objects::{DomainObject, MasterObject, Owner, ec_domain_t, ec_master_t, ec_slave_config_t};
+use super::opened::{self, Opened};
 use crate::code::{Outcome, report};
 use crate::host::at_exit;
-use crate::locks::locked;
 use crate::master::Master;
 use crate::settings::Name;
 
 /// Version of the interface: 1.6.
 const VERSION_MAGIC: c_uint = 1 << 8 | 6;
 
-/// Masters that were not released.
-static OPENED: Mutex<Vec<usize>> = Mutex::new(Vec::new());
+/// A master that was not released.
+struct OpenedMaster {
+    handle: Ending,
+    address: usize,
+    owner: Arc<Owner>,
+}
+
+impl Opened for OpenedMaster {
+    fn address(&self) -> usize {
+        self.address
+    }
+
+    fn has(&self, address: usize) -> bool {
+        self.address == address || self.owner.has_child(address)
+    }
+
+    fn fail(&self) {
+        self.handle.fail();
+        self.owner.fail_children();
+    }
+}
 
 /// At `exit` everything is released, as the kernel does for a program that ends.
 extern "C" fn release_all() {
-    // In a child made by `fork` another thread may have had the list.
-    let opened = OPENED.try_lock().map(|mut opened| std::mem::take(&mut *opened)).unwrap_or_default();
-    for address in opened {
-        // SAFETY: handles of the library that were not released; those of a parent process are found out.
-        unsafe { ecrt_release_master(address as *mut ec_master_t) };
-    }
+    let release = || {
+        for address in opened::addresses() {
+            // SAFETY: a handle of the library that was not released.
+            unsafe { ecrt_release_master(address as *mut ec_master_t) };
+        }
+    };
+    caught(0, (), release)
 }
 
 #[unsafe(no_mangle)]
 extern "C" fn ecrt_version_magic() -> c_uint {
-    VERSION_MAGIC
+    caught(0, 0, || VERSION_MAGIC)
 }
 
 #[unsafe(no_mangle)]
 extern "C" fn ecrt_open_master(master_index: c_uint) -> *mut ec_master_t {
+    caught(0, null_mut(), || open(master_index))
+}
+
+fn open(master_index: c_uint) -> *mut ec_master_t {
     match Master::open(master_index) {
         Ok(master) => {
-            let master = give(MasterObject(Arc::new(Owner::new(master))));
+            let owner = Arc::new(Owner::new(master));
+            let master = give(MasterObject(owner.clone()));
             at_exit(release_all);
-            locked(&OPENED).push(master as usize);
+            opened::add(OpenedMaster { handle: ending(master), address: master as usize, owner });
             master
         }
         Err(message) => {
@@ -51,15 +77,18 @@ extern "C" fn ecrt_open_master(master_index: c_uint) -> *mut ec_master_t {
 
 #[unsafe(no_mangle)]
 extern "C" fn ecrt_request_master(master_index: c_uint) -> *mut ec_master_t {
-    let master = ecrt_open_master(master_index);
-    // SAFETY: NULL, or the handle that was just made.
-    unsafe {
-        if !master.is_null() && ecrt_master_reserve(master) != 0 {
-            ecrt_release_master(master);
-            return null_mut();
+    let request = || {
+        let master = open(master_index);
+        // SAFETY: NULL, or the handle that was just made.
+        unsafe {
+            if !master.is_null() && ecrt_master_reserve(master) != 0 {
+                ecrt_release_master(master);
+                return null_mut();
+            }
         }
-    }
-    master
+        master
+    };
+    caught(0, null_mut(), request)
 }
 
 #[unsafe(no_mangle)]
@@ -70,15 +99,18 @@ unsafe extern "C" fn ecrt_master_reserve(master: *mut ec_master_t) -> c_int {
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_release_master(master: *mut ec_master_t) {
-    // SAFETY: a handle of the library (ecrt.h).
-    if let Ok(MasterObject(owner)) = unsafe { alive(master) } {
-        let owner = owner.clone();
-        locked(&OPENED).retain(|opened| *opened != master as usize);
-        // The handle ends first: a second release at the same time does nothing.
-        bury(ending(master));
-        owner.end_children();
-        owner.master.release();
-    }
+    let release = || {
+        // SAFETY: a handle of the library (ecrt.h).
+        if let Ok((MasterObject(owner), has_failed)) = unsafe { alive_or_failed(master) } {
+            let owner = owner.clone();
+            opened::remove(master as usize);
+            // The handle ends first: a second release at the same time does nothing.
+            bury(ending(master));
+            owner.end_children();
+            if has_failed { owner.master.abandon() } else { owner.master.release() }
+        }
+    };
+    caught(master as usize, (), release)
 }
 
 #[unsafe(no_mangle)]
@@ -105,7 +137,7 @@ unsafe extern "C" fn ecrt_master_create_domain(master: *mut ec_master_t) -> *mut
         Ok(owner.give_child(DomainObject { owner: owner.clone(), id, words }))
     };
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { alive(master) }.and_then(create).unwrap_or(null_mut())
+    unsafe { ask(master, null_mut(), |master| create(master).unwrap_or(null_mut())) }
 }
 
 #[unsafe(no_mangle)]
@@ -116,10 +148,12 @@ unsafe extern "C" fn ecrt_master_slave_config(
     vendor_id: u32,
     product_code: u32,
 ) -> *mut ec_slave_config_t {
-    let name = Name { alias, position, vendor: vendor_id, product: product_code };
-    let declare = |MasterObject(owner): &MasterObject| Ok(owner.slave(owner.declare(name)?));
+    let declare = |MasterObject(owner): &MasterObject| -> Outcome<*mut ec_slave_config_t> {
+        let name = Name { alias, position, vendor: vendor_id, product: product_code };
+        Ok(owner.slave(owner.declare(name)?))
+    };
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { alive(master) }.and_then(declare).unwrap_or(null_mut())
+    unsafe { ask(master, null_mut(), |master| declare(master).unwrap_or(null_mut())) }
 }
 
 #[unsafe(no_mangle)]
@@ -134,4 +168,37 @@ unsafe extern "C" fn ecrt_master_select_reference_clock(master: *mut ec_master_t
     };
     // SAFETY: a handle of the library (ecrt.h).
     unsafe { call(master, select) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::active::Active;
+    use crate::code::Code;
+
+    /// A panic in the cycle leaves the application half changed: it is dropped at the release, not used.
+    // covers: c-interface
+    #[test]
+    fn a_panic_in_a_cyclic_call_ends_the_use_of_the_application_until_a_release() {
+        let segment = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/c/services.toml");
+        // SAFETY: the tests of this crate read variables by the standard library alone, which has a lock for them.
+        unsafe { std::env::set_var("RINGCAT_SIM_71", segment) };
+        for _ in 0..2 {
+            let master = ecrt_request_master(71);
+            // SAFETY: handles of the library.
+            unsafe {
+                let domain = ecrt_master_create_domain(master);
+                assert_eq!(ecrt_master_activate(master), 0);
+                let cyclic = |work: fn(&mut Active)| call(domain, |domain| domain.owner.master.cycle(work));
+                assert_eq!(cyclic(Active::send), 0);
+                assert_eq!(cyclic(|_| panic!("half changed")), Code::IO.0);
+                assert_eq!(cyclic(Active::send), Code::IO.0);
+                let owner = &alive_or_failed(master).expect("it is not released").0.0;
+                assert_eq!(owner.master.cycle(Active::send), Err(Code::IO));
+                assert_eq!((ecrt_master_activate(master), ecrt_master_deactivate(master)), (Code::IO.0, Code::IO.0));
+                ecrt_release_master(master);
+                assert_eq!(ecrt_master_activate(master), Code::INVALID.0);
+            }
+        }
+    }
 }

@@ -121,8 +121,8 @@ unsafe extern "C" fn ecrt_master_reset(handle: *mut ec_master_t) -> c_int {
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_master_set_send_interval(handle: *mut ec_master_t, send_interval: usize) -> c_int {
-    let interval = Duration::from_micros(u64::try_from(send_interval).unwrap_or(u64::MAX));
     let set = |MasterObject(owner): &MasterObject| {
+        let interval = Duration::from_micros(u64::try_from(send_interval).unwrap_or(u64::MAX));
         owner.master.change(|draft| {
             draft.set_send_interval(interval);
             Ok(())

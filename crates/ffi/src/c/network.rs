@@ -4,7 +4,7 @@ use std::ffi::{c_char, c_int, c_uint, c_void};
 use std::ptr::null_mut;
 use std::sync::Arc;
 
-use super::handle::{alive, call};
+use super::handle::{ask, call};
 use super::memory::{bytes, put, text};
 use super::objects::{MasterObject, Owner, ec_domain_t, ec_master_t, ec_slave_config_t};
 use crate::code::{Code, Outcome};
@@ -85,12 +85,13 @@ unsafe fn named<T>(
     name: *const c_char,
     find: impl FnOnce(&Arc<Owner>, &str) -> Outcome<*mut T>,
 ) -> *mut T {
-    let found = || {
+    let found = |MasterObject(owner): &MasterObject| {
         // SAFETY: the caller's promise.
-        let (MasterObject(owner), name) = unsafe { (alive(master)?, text(name)?) };
+        let name = unsafe { text(name) }?;
         find(owner, &name)
     };
-    found().unwrap_or(null_mut())
+    // SAFETY: the caller's promise.
+    unsafe { ask(master, null_mut(), |master| found(master).unwrap_or(null_mut())) }
 }
 
 #[unsafe(no_mangle)]

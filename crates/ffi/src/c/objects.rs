@@ -90,6 +90,16 @@ impl Owner {
         handle
     }
 
+    /// Whether a handle ends with the application.
+    pub fn has_child(&self, address: usize) -> bool {
+        locked(&self.children).iter().any(|child| child.is_of(address))
+    }
+
+    /// From now on all handles but that of the master are refused.
+    pub fn fail_children(&self) {
+        locked(&self.children).iter().for_each(Ending::fail);
+    }
+
     /// Ends all handles but that of the master.
     pub fn end_children(&self) {
         locked(&self.slaves).clear();

@@ -5,7 +5,7 @@ use std::ptr::null_mut;
 
 use ringcat::{RegisterAddress, RegisterRequest, Services};
 
-use super::handle::{Handle, Kind, alive, call};
+use super::handle::{Handle, Kind, ask, call};
 use super::objects::{SlaveObject, ec_reg_request_t, ec_sdo_request_t, ec_slave_config_t};
 use crate::bus::Bus;
 use crate::code::{Code, Outcome};
@@ -37,7 +37,7 @@ where
         Ok(slave.owner.give_child(make(&bus, slave)?))
     };
     // SAFETY: the caller's promise.
-    unsafe { alive(sc) }.and_then(create).unwrap_or(null_mut())
+    unsafe { ask(sc, null_mut(), |slave| create(slave).unwrap_or(null_mut())) }
 }
 
 #[unsafe(no_mangle)]
@@ -71,19 +71,19 @@ unsafe extern "C" fn ecrt_sdo_request_timeout(req: *mut ec_sdo_request_t, timeou
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_sdo_request_data(req: *const ec_sdo_request_t) -> *mut u8 {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { alive(req) }.map_or(null_mut(), Requested::memory)
+    unsafe { ask(req, null_mut(), Requested::memory) }
 }
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_sdo_request_data_size(req: *const ec_sdo_request_t) -> usize {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { alive(req) }.map_or(0, Requested::length)
+    unsafe { ask(req, 0, Requested::length) }
 }
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_sdo_request_state(req: *const ec_sdo_request_t) -> u32 {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { alive(req) }.map_or(ERROR, Requested::state)
+    unsafe { ask(req, ERROR, Requested::state) }
 }
 
 #[unsafe(no_mangle)]
@@ -114,20 +114,22 @@ unsafe extern "C" fn ecrt_slave_config_create_reg_request(
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_reg_request_data(req: *const ec_reg_request_t) -> *mut u8 {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { alive(req) }.map_or(null_mut(), Requested::memory)
+    unsafe { ask(req, null_mut(), Requested::memory) }
 }
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_reg_request_state(req: *const ec_reg_request_t) -> u32 {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { alive(req) }.map_or(ERROR, Requested::state)
+    unsafe { ask(req, ERROR, Requested::state) }
 }
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_reg_request_write(req: *mut ec_reg_request_t, address: u16, size: usize) -> c_int {
-    let address = RegisterAddress(address);
+    let write = |request: &Requested<RegisterRequest>| {
+        request.write(size, |request, data| request.write(RegisterAddress(address), data))
+    };
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { call(req, |request| request.write(size, |request, data| request.write(address, data))) }
+    unsafe { call(req, write) }
 }
 
 #[unsafe(no_mangle)]

@@ -8,7 +8,7 @@ use libc::in_addr;
 use ringcat::{DomainId, Entry, EntryPlace, IpSettings, PdoEntry, SdoDownload, SubDeviceInfo};
 
 use super::cyclic::put_bit;
-use super::handle::{alive, call};
+use super::handle::{alive, call, call_for};
 use super::memory::{bytes, list, text};
 use super::objects::{SlaveObject, ec_domain_t, ec_slave_config_t};
 use crate::code::{Code, Outcome};
@@ -155,9 +155,9 @@ unsafe fn register(
     bit_position: *mut c_uint,
     place: impl FnOnce(&mut Draft, usize, DomainId) -> Outcome<Entry>,
 ) -> c_int {
-    let registered = || -> Outcome<c_int> {
+    let registered = |slave: &SlaveObject| -> Outcome<c_int> {
         // SAFETY: the caller's promise.
-        let (slave, domain) = unsafe { (alive(sc)?, alive(domain)?) };
+        let domain = unsafe { alive(domain) }?;
         if !Arc::ptr_eq(&slave.owner, &domain.owner) {
             return Err(Code::INVALID);
         }
@@ -166,7 +166,8 @@ unsafe fn register(
         unsafe { put_bit(bit_position, entry.bit_position()) }?;
         c_int::try_from(entry.byte_offset()).map_err(|_| Code::OVERFLOW)
     };
-    registered().unwrap_or_else(|Code(code)| code)
+    // SAFETY: the caller's promise.
+    unsafe { call_for(sc, registered) }
 }
 
 #[unsafe(no_mangle)]
@@ -177,9 +178,9 @@ unsafe extern "C" fn ecrt_slave_config_reg_pdo_entry(
     domain: *mut ec_domain_t,
     bit_position: *mut c_uint,
 ) -> c_int {
-    let object = (entry_index, entry_subindex);
+    let place = |draft: &mut Draft, slave, domain| draft.register(slave, domain, (entry_index, entry_subindex));
     // SAFETY: handles of the library, memory for the bit or NULL (ecrt.h).
-    unsafe { register(sc, domain, bit_position, |draft, slave, domain| draft.register(slave, domain, object)) }
+    unsafe { register(sc, domain, bit_position, place) }
 }
 
 #[unsafe(no_mangle)]
@@ -191,9 +192,11 @@ unsafe extern "C" fn ecrt_slave_config_reg_pdo_entry_pos(
     domain: *mut ec_domain_t,
     bit_position: *mut c_uint,
 ) -> c_int {
-    let place = EntryPlace::new(sync_index, pdo_pos as usize, entry_pos as usize);
+    let place = |draft: &mut Draft, slave, domain| {
+        draft.register_at(slave, domain, EntryPlace::new(sync_index, pdo_pos as usize, entry_pos as usize))
+    };
     // SAFETY: handles of the library, memory for the bit or NULL (ecrt.h).
-    unsafe { register(sc, domain, bit_position, |draft, slave, domain| draft.register_at(slave, domain, place)) }
+    unsafe { register(sc, domain, bit_position, place) }
 }
 
 #[unsafe(no_mangle)]
@@ -220,12 +223,17 @@ unsafe extern "C" fn ecrt_slave_config_dc(
 ///
 /// # Safety
 /// A handle of the library; `size` bytes can be read at `data`, or it is NULL.
-unsafe fn add_sdo(sc: *mut ec_slave_config_t, sdo: SdoDownload, data: *const u8, size: usize) -> c_int {
+unsafe fn add_sdo(
+    sc: *mut ec_slave_config_t,
+    sdo: impl FnOnce() -> SdoDownload,
+    data: *const u8,
+    size: usize,
+) -> c_int {
     // SAFETY: the caller's promise.
     unsafe {
         call(sc, |slave| {
             let data = bytes(data, size)?.to_vec();
-            change(slave, |settings, _| settings.add_sdo(with_data(sdo, data)))
+            change(slave, |settings, _| settings.add_sdo(with_data(sdo(), data)))
         })
     }
 }
@@ -244,7 +252,7 @@ unsafe extern "C" fn ecrt_slave_config_sdo(
     size: usize,
 ) -> c_int {
     // SAFETY: a handle of the library, data of this size (ecrt.h).
-    unsafe { add_sdo(sc, SdoDownload::new(index, subindex, []), data, size) }
+    unsafe { add_sdo(sc, || SdoDownload::new(index, subindex, []), data, size) }
 }
 
 #[unsafe(no_mangle)]
@@ -255,7 +263,7 @@ unsafe extern "C" fn ecrt_slave_config_complete_sdo(
     size: usize,
 ) -> c_int {
     // SAFETY: a handle of the library, data of this size (ecrt.h).
-    unsafe { add_sdo(sc, SdoDownload::new(index, 0, []).with_complete_access(true), data, size) }
+    unsafe { add_sdo(sc, || SdoDownload::new(index, 0, []).with_complete_access(true), data, size) }
 }
 
 #[unsafe(no_mangle)]
@@ -345,9 +353,12 @@ unsafe extern "C" fn ecrt_slave_config_state_timeout(
     to_state: c_int,
     timeout_ms: c_uint,
 ) -> c_int {
-    let limit = Duration::from_millis(timeout_ms.into());
+    let set = |slave: &SlaveObject| {
+        let limit = Duration::from_millis(timeout_ms.into());
+        change(slave, |settings, _| settings.set_state_timeout(from_state, to_state, limit))
+    };
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { call(sc, |slave| change(slave, |settings, _| settings.set_state_timeout(from_state, to_state, limit))) }
+    unsafe { call(sc, set) }
 }
 
 /// Changes the IP parameters of a SubDevice.

@@ -4,10 +4,10 @@ use std::ffi::{c_int, c_uint};
 
 use ringcat::{Position, SubDeviceStatus};
 
-use super::handle::{alive, call};
+use super::handle::{call, call_for};
 use super::memory::put;
 use super::objects::{SlaveObject, ec_slave_config_t};
-use crate::code::{Code, Outcome, number};
+use crate::code::{Code, Outcome};
 use crate::types::SlaveConfigState;
 
 /// Bytes of an emergency.
@@ -72,10 +72,10 @@ unsafe extern "C" fn ecrt_slave_config_emerg_clear(sc: *mut ec_slave_config_t) -
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_slave_config_emerg_overruns(sc: *const ec_slave_config_t) -> c_int {
+    let count = |slave: &SlaveObject| {
+        let overruns = slave.emergencies(|ring| ring.overruns())?;
+        Ok(c_int::try_from(overruns).unwrap_or(c_int::MAX))
+    };
     // SAFETY: a handle of the library (ecrt.h).
-    let counted = unsafe { alive(sc) }.and_then(|slave| slave.emergencies(|ring| ring.overruns()));
-    match counted {
-        Ok(overruns) => c_int::try_from(overruns).unwrap_or(c_int::MAX),
-        Err(code) => number(Err(code)),
-    }
+    unsafe { call_for(sc, count) }
 }

@@ -5,7 +5,7 @@ use std::ptr::null_mut;
 
 use ringcat::{Idn, Services, SoeRequest, VoeHandler};
 
-use super::handle::{alive, call};
+use super::handle::{ask, call};
 use super::memory::put;
 use super::objects::{SlaveObject, ec_slave_config_t, ec_soe_request_t, ec_voe_handler_t};
 use super::requests::{ERROR, create};
@@ -58,19 +58,19 @@ unsafe extern "C" fn ecrt_soe_request_timeout(req: *mut ec_soe_request_t, timeou
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_soe_request_data(req: *const ec_soe_request_t) -> *mut u8 {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { alive(req) }.map_or(null_mut(), Requested::memory)
+    unsafe { ask(req, null_mut(), Requested::memory) }
 }
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_soe_request_data_size(req: *const ec_soe_request_t) -> usize {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { alive(req) }.map_or(0, Requested::length)
+    unsafe { ask(req, 0, Requested::length) }
 }
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_soe_request_state(req: *const ec_soe_request_t) -> u32 {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { alive(req) }.map_or(ERROR, Requested::state)
+    unsafe { ask(req, ERROR, Requested::state) }
 }
 
 #[unsafe(no_mangle)]
@@ -131,13 +131,13 @@ unsafe extern "C" fn ecrt_voe_handler_received_header(
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_voe_handler_data(voe: *const ec_voe_handler_t) -> *mut u8 {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { alive(voe) }.map_or(null_mut(), Requested::memory)
+    unsafe { ask(voe, null_mut(), Requested::memory) }
 }
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_voe_handler_data_size(voe: *const ec_voe_handler_t) -> usize {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { alive(voe) }.map_or(0, Requested::length)
+    unsafe { ask(voe, 0, Requested::length) }
 }
 
 #[unsafe(no_mangle)]
@@ -161,5 +161,5 @@ unsafe extern "C" fn ecrt_voe_handler_read_nosync(voe: *mut ec_voe_handler_t) ->
 #[unsafe(no_mangle)]
 unsafe extern "C" fn ecrt_voe_handler_execute(voe: *mut ec_voe_handler_t) -> u32 {
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { alive(voe) }.map_or(ERROR, Requested::state)
+    unsafe { ask(voe, ERROR, Requested::state) }
 }

@@ -1,17 +1,22 @@
 /*
  * realtime own|daemon: cyclic calls beside another thread. The functions that the manual marks as fit for a real-time
- * thread allocate nothing and make system calls only for frames; a second caller at the same time gets -EBUSY, and the
- * first one is not disturbed. With "own" receive and send are not counted: the segment that is simulated in this
- * process allocates in them.
+ * thread neither allocate nor free, take no lock, and make system calls only for frames; a second caller at the same
+ * time gets -EBUSY, and the first one is not disturbed. With "own" receive and send are not counted: the segment that
+ * is simulated in this process allocates in them.
  *
  * While it counts, writes to an invalid descriptor mark the parts of the cycle in a trace of system calls: "counted",
  * "frames", "pause". At the end it prints the names of the functions.
  */
+#define _GNU_SOURCE
+#include <dlfcn.h>
 #include <errno.h>
+#include <malloc.h>
 #include <pthread.h>
+#include <stdarg.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -30,9 +35,11 @@ enum { DRIVE = 2, PROTOCOLS = 3, AXES = 4, MOST = 80, ROUNDS = 500 };
 extern void *__libc_malloc(size_t size);
 extern void *__libc_calloc(size_t count, size_t size);
 extern void *__libc_realloc(void *memory, size_t size);
+extern void *__libc_memalign(size_t alignment, size_t size);
+extern void __libc_free(void *memory);
 
 static _Thread_local int counts;
-static _Thread_local unsigned long allocations;
+static _Thread_local unsigned long allocations, locks;
 
 void *malloc(size_t size)
 {
@@ -50,6 +57,97 @@ void *realloc(void *memory, size_t size)
 {
     allocations += (unsigned long) counts;
     return __libc_realloc(memory, size);
+}
+
+void *memalign(size_t alignment, size_t size)
+{
+    allocations += (unsigned long) counts;
+    return __libc_memalign(alignment, size);
+}
+
+void *aligned_alloc(size_t alignment, size_t size)
+{
+    return memalign(alignment, size);
+}
+
+int posix_memalign(void **memory, size_t alignment, size_t size)
+{
+    *memory = memalign(alignment, size);
+    return *memory ? 0 : ENOMEM;
+}
+
+void free(void *memory)
+{
+    allocations += counts && memory;
+    __libc_free(memory);
+}
+
+/* The function of this name in the C library. */
+#define NEXT(name) static __typeof__(name) *next; if (!next) *(void **) &next = dlsym(RTLD_NEXT, #name)
+
+void *mmap(void *place, size_t size, int protection, int flags, int descriptor, off_t offset)
+{
+    NEXT(mmap);
+    allocations += (unsigned long) counts;
+    return next(place, size, protection, flags, descriptor, offset);
+}
+
+void *mmap64(void *place, size_t size, int protection, int flags, int descriptor, off64_t offset)
+{
+    return mmap(place, size, protection, flags, descriptor, offset);
+}
+
+/* Locks of the C library. Those of Rust call syscall(SYS_futex) when they wait or wake. */
+int pthread_mutex_lock(pthread_mutex_t *mutex)
+{
+    NEXT(pthread_mutex_lock);
+    locks += (unsigned long) counts;
+    return next(mutex);
+}
+
+long syscall(long number, ...)
+{
+    long arguments[6];
+    va_list list;
+    int i;
+
+    NEXT(syscall);
+    locks += (unsigned long) counts;
+    va_start(list, number);
+    for (i = 0; i < 6; i++)
+        arguments[i] = va_arg(list, long);
+    va_end(list);
+    return next(number, arguments[0], arguments[1], arguments[2], arguments[3], arguments[4], arguments[5]);
+}
+
+/* That what is to be counted is counted. */
+static int counting_works(void)
+{
+    static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
+    void *volatile memory[6] = {0};
+    void *aligned = NULL;
+    int i, result;
+
+    counts = 1;
+    memory[0] = malloc(8);
+    memory[1] = calloc(1, 8);
+    memory[2] = realloc(NULL, 8);
+    memory[3] = aligned_alloc(64, 64);
+    result = posix_memalign(&aligned, 64, 64);
+    memory[4] = aligned;
+    memory[5] = mmap(NULL, 4096, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    counts = 0;
+    CHECK(!result && memory[5] != MAP_FAILED && allocations == 6);
+    counts = 1;
+    for (i = 0; i < 5; i++)
+        free(memory[i]);
+    pthread_mutex_lock(&mutex);
+    pthread_mutex_unlock(&mutex);
+    counts = 0;
+    munmap(memory[5], 4096);
+    CHECK(allocations == 11 && locks == 1);
+    allocations = locks = 0;
+    return 0;
 }
 
 static ec_master_t *master;
@@ -310,6 +408,7 @@ int main(int argc, char **argv)
     int i;
 
     CHECK(argc == 2);
+    CHECK(!counting_works());
     is_own = !strcmp(argv[1], "own");
     CHECK(configure() == 0);
     for (i = 0; i < 10000 && !(drive.operational && is_complete() && is_up()); i++) {
@@ -325,6 +424,7 @@ int main(int argc, char **argv)
         }
     measures = 0;
     printf("allocations %lu\n", allocations);
+    printf("locks %lu\n", locks);
     CHECK(both() == 0);
     for (i = 0; i < 100; i++)
         CHECK(cycle() == 0);

@@ -70,6 +70,7 @@ static void show(void)
     codes[0] = ecrt_master_state(master, &state);
     printf("master: %d, link %d\n", codes[0], state.link_up);
     printf("slave: %d\n", ecrt_master_get_slave(master, 0, &slave));
+    printf("activate: %d\n", ecrt_master_activate(master));
     codes[0] = ecrt_master_deactivate(master);
     codes[1] = ecrt_master_activate(master);
     printf("deactivate: %d, activate: %d, receive: %d\n", codes[0], codes[1], ecrt_master_receive(master));

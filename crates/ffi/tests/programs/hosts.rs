@@ -58,6 +58,15 @@ fn handles_of_a_parent_are_refused_in_a_child_which_may_open_a_master_of_its_own
 
 // covers: c-interface
 #[test]
+fn a_child_that_is_made_while_another_thread_requests_a_master_requests_one_too() {
+    let Some(beside) = program(&here().join("tests/c/fork_beside.c"), &[]) else { return };
+    let (output, ended) = on_segment(&beside, &here().join("tests/c/services.toml"), &[]);
+    assert_eq!(ended, Ok(()), "{output}");
+    println!("{output}");
+}
+
+// covers: c-interface
+#[test]
 fn threads_of_the_library_block_all_signals_install_no_handler_and_end_at_release() {
     ends_well(&["threads"]);
 }

@@ -42,6 +42,7 @@ fn a_stopped_program_gets_the_loss_of_its_bus_and_requests_it_again() {
         "domain: 0, counter 0, state 0",
         "master: 0, link 0",
         "slave: -19",
+        "activate: -19",
         "deactivate: 0, activate: -19, receive: 0",
         "op again",
     ];

@@ -9,6 +9,7 @@ mod cut;
 mod daemon;
 mod exits;
 mod fake;
+mod guarded;
 mod hosts;
 mod inside;
 mod library;

@@ -64,6 +64,48 @@ fn the_headers_are_clean_in_c99_c11_and_cpp17() {
     }
 }
 
+/// What `crates/ffi/reference` makes pages of.
+// covers: c-interface
+#[test]
+fn each_function_of_the_facts_has_a_comment_with_phases_and_what_it_returns() {
+    let header = std::fs::read_to_string(here().join("include/ecrt.h")).expect("the header");
+    let facts = include_str!("../facts/ecrt_symbol_versions.csv");
+    let mut wrong = Vec::new();
+    for (name, _) in facts.lines().skip(1).filter_map(|line| line.split_once(',')) {
+        let call = format!("{name}(");
+        let declared = header.match_indices(&call).filter_map(|(at, _)| {
+            let (before, line) = header[..at].rsplit_once('\n')?;
+            line.strip_prefix("EC_PUBLIC_API ").map(|kind| (before, kind))
+        });
+        let Some((before, kind)) = declared.last() else {
+            wrong.push(format!("{name}: not declared"));
+            continue;
+        };
+        // The comment ends in the line before.
+        let comment = before.rsplit_once("/**").filter(|_| before.ends_with("*/")).map_or("", |(_, text)| text);
+        let is_whole = comment.matches("*/").count() == 1 && comment.contains("Phases: ");
+        if !is_whole || comment.contains("@return ") == (kind == "void ") {
+            wrong.push(format!("{name}: {comment}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// On processors with pointers of 32 bits too, for which `ci/cross-examples` compiles it.
+// covers: c-interface
+#[test]
+fn the_compiler_agrees_with_the_layout_of_the_structures() {
+    if library().is_none() {
+        return;
+    }
+    let mut command = Command::new("cc");
+    command.args(["-std=c11", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fsyntax-only", "-I"]);
+    run(command.arg(here().join("include")).arg(here().join("tests/c/layout.c")));
+    let layout = std::fs::read_to_string(here().join("tests/c/layout.c")).expect("the file");
+    let facts = include_str!("../facts/ecrt_abi_x86_64.txt");
+    assert_eq!(layout.lines().filter(|line| line.starts_with("HAS(")).count(), facts.lines().count());
+}
+
 // covers: c-interface
 #[cfg(target_arch = "x86_64")]
 #[test]

@@ -164,6 +164,28 @@ fn paths_in_installed_files_exist_with_every_prefix() {
     }
 }
 
+/// `lib` and `include` are in the test of `crates/ffi`.
+// covers: daemon
+#[test]
+fn the_prefix_of_the_manual_has_its_bin_sbin_and_etc_init_d() {
+    let root = Root::new();
+    root.install(&["--prefix", "/opt/etherlab"]);
+    for (path, mode) in
+        [("bin/ethercat", 0o755), ("sbin/ethercatctl", 0o755), ("sbin/ringcatd", 0o755), ("etc/init.d/ethercat", 0o755)]
+    {
+        let file = std::fs::metadata(root.path("/opt/etherlab").join(path)).expect(path);
+        assert_eq!(file.mode() & 0o777, mode, "{path}");
+    }
+    let script = root.text("/opt/etherlab/etc/init.d/ethercat");
+    assert!(script.contains("exec /opt/etherlab/sbin/ethercatctl "), "{script}");
+    // The system's own place has none where systemd starts the daemon.
+    assert!(!root.path("/etc/init.d/ethercat").exists());
+    said(&root.run(&["--prefix", "/opt/etherlab", "--uninstall"]), true);
+    assert!(root.is_empty(), "{:?}", root.files());
+    root.install(&["--prefix", "/usr/local"]);
+    assert!(!root.path("/usr/local/etc").exists());
+}
+
 // covers: daemon
 #[test]
 fn each_directory_can_be_chosen() {

@@ -260,6 +260,12 @@ fn memory_that_is_too_short_or_has_two_owners_is_refused_and_comes_back() {
     let back = main_device.unused_memory(FIRST).expect("it was not used");
     assert_eq!(back.len(), 800);
     let mut declaration = automatic(&scan.subdevices, CYCLE);
+    declaration.place_image(FIRST, back);
+    declaration.domains[FIRST.0].under_way = 0;
+    assert!(main_device.load(declaration).is_err(), "an error of the declaration alone");
+    let back = main_device.unused_memory(FIRST).expect("it comes back, too");
+    assert_eq!(back.len(), 800);
+    let mut declaration = automatic(&scan.subdevices, CYCLE);
     declaration.place_image(FIRST, Vec::leak(vec![0; 801]));
     let mut application = main_device.activate(declaration).map_err(|refused| refused.error).expect("it fits");
     application.wait_until_op(Duration::from_secs(5)).expect("it settles");
