@@ -4,7 +4,8 @@
 # What tests and benches use beyond the compiler: valgrind counts instructions, iproute2 makes the network namespaces
 # that tests on real interfaces run in, tshark reads captures, strace counts system calls, pkg-config finds the library
 # that was installed, ethercatctl needs procps. CMake, lintian, mandoc, groff, shellcheck, zsh and fish read the files
-# of packages that are made for them. Packages are installed on the machine of CI only (apt-get takes about half a minute).
+# of packages that are made for them. Packages are installed on the machine of CI only; apt-get takes about half a
+# minute.
 root_layer() {
     local missing=() tool
     declare -A package=([valgrind]=valgrind [ip]=iproute2 [tshark]=tshark [strace]=strace [pkg-config]=pkg-config

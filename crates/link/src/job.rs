@@ -49,8 +49,8 @@ impl HeldJobSignals {
         JobSignal::ALL.into_iter().find(|signal| signal.number() == number)
     }
 
-    /// Stops this process, until SIGCONT. It goes on at once where nobody could continue it: in an orphaned process
-    /// group.
+    /// Stops this process, until SIGCONT. It goes on at once where no shell could continue it: in an orphaned
+    /// process group.
     pub fn stop(&self) {
         // SAFETY: no pointers are passed. The signal is of this process.
         unsafe { libc::kill(libc::getpid(), libc::SIGTSTP) };
