@@ -73,6 +73,14 @@ impl Terminal {
         }
     }
 
+    /// Waits for texts one behind the other, behind the first `from` bytes; where the last one ends.
+    fn wait_for_all(&self, texts: &[&str], from: usize) -> usize {
+        texts.iter().fold(from, |from, text| {
+            self.wait_for(text, from);
+            from + self.shown()[from..].find(text).expect("it has come") + text.len()
+        })
+    }
+
     fn press(&mut self, keys: &[u8]) {
         let input = self.input.as_mut().expect("it is open");
         input.write_all(keys).and_then(|()| input.flush()).expect("it is read");
@@ -239,24 +247,24 @@ fn is_usual(settings: &str) -> bool {
 // covers: daemon
 #[test]
 fn a_live_table_that_is_stopped_gives_the_terminal_back_and_is_drawn_again() {
+    const END: &str = "\u{1b}[?25h\u{1b}[?1049l";
     const AGAIN: &str = "\u{1b}[?1049h\u{1b}[?25l\u{1b}[HMaster0  idle";
     let bench = Bench::start(vec![ring(2, false)]);
     let file = |name: &str| std::fs::read_to_string(bench.directory.join(name)).unwrap_or_default();
     let shell = "set -m; sh -c 'echo $$ > pid; exec $E watch'; stty -a > stopped; echo $? > code; fg > /dev/null";
+    let last = "stty sane; echo > sane; fg > /dev/null; stty -a > after";
     // By a signal, and by the key.
-    let mut terminal = Terminal::start(&bench, &format!("{shell}; stty -a > again; fg > /dev/null; stty -a > after"));
-    let at = terminal.wait_for(AGAIN, 0);
+    let mut terminal = Terminal::start(&bench, &format!("{shell}; stty -a > again; fg > /dev/null; {last}"));
+    let at = terminal.wait_for_all(&[AGAIN], 0);
     let kill = |signal: &str| {
         let sent = Command::new("kill").args([signal, file("pid").trim()]).status();
         assert!(sent.expect("it is there").success());
     };
     kill("-TSTP");
-    let at = terminal.wait_for("\u{1b}[?25h\u{1b}[?1049l", at);
-    let at = terminal.wait_for(AGAIN, at);
+    let at = terminal.wait_for_all(&[END, AGAIN], at);
     assert!(is_usual(&file("stopped")), "{}", file("stopped"));
     terminal.press(b"\x1a");
-    let at = terminal.wait_for("\u{1b}[?25h\u{1b}[?1049l", at);
-    let at = terminal.wait_for(AGAIN, at);
+    let at = terminal.wait_for_all(&[END, AGAIN], at);
     assert!(is_usual(&file("again")), "{}", file("again"));
     // SIGSTOP cannot be received: the table takes the terminal again when it goes on.
     let tty = file("tty");
@@ -265,10 +273,9 @@ fn a_live_table_that_is_stopped_gives_the_terminal_back_and_is_drawn_again() {
         String::from_utf8_lossy(&done.stdout).into_owned()
     };
     kill("-STOP");
-    stty(&["sane"]);
-    kill("-CONT");
-    terminal.wait_for(AGAIN, at);
-    assert!(stty(&["-a"]).contains("-icanon"));
+    bench.wait_until("the shell", || bench.directory.join("sane").exists());
+    bench.wait_until("the terminal is taken again", || stty(&["-a"]).contains("-icanon"));
+    terminal.wait_for_all(&[AGAIN], at);
     kill("-QUIT");
     let (shown, _) = terminal.end();
     assert!(shown.ends_with("\u{1b}[?25h\u{1b}[?1049l"), "{shown:?}");
