@@ -2,8 +2,6 @@
 
 mod names;
 
-use std::fs::{self, OpenOptions};
-use std::io::Write;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -19,6 +17,7 @@ use crate::descriptions::{Descriptions, EsiArgument, objects};
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::network::Init;
+use crate::out_file::Overwrite;
 use crate::output::{counted, say, warn};
 use crate::times::{cycle, in_words};
 use crate::verdict::{Report, Verdict};
@@ -72,9 +71,8 @@ pub struct InitArguments {
     /// File to write
     #[arg(long, value_name = "FILE.toml", help_heading = "Output")]
     out: PathBuf,
-    /// Replace the file if it exists
-    #[arg(long, help_heading = "Output")]
-    overwrite: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 /// Comparison of revisions.
@@ -101,9 +99,7 @@ impl From<Revisions> for CheckRevision {
 /// Scans and writes the file.
 pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
     let out = &arguments.out;
-    if !arguments.overwrite && fs::symlink_metadata(out).is_ok() {
-        return Err(Failure::new(format!("{} exists: name another file, or add --overwrite", out.display())));
-    }
+    arguments.overwrite.check(out)?;
     let mut descriptions = arguments.esi.open()?;
     let begin = Instant::now();
     let mut wanted = |info: &SubDeviceInfo| Wanted {
@@ -128,7 +124,7 @@ pub fn run(arguments: &InitArguments) -> Result<Report, Failure> {
     let text = file.to_text();
     // What is written must be what `run` reads.
     NetworkFile::read(&out.display().to_string(), text.as_bytes()).map_err(|error| Failure::new(error.to_string()))?;
-    write(arguments, &text)?;
+    arguments.overwrite.write(out, text.as_bytes())?;
     let us = |time: Duration| u64::try_from(time.as_micros()).unwrap_or(u64::MAX);
     let (scan_us, file_us) = (us(scanned - begin), us(scanned.elapsed()));
     let digest = file.digest().to_string();
@@ -182,12 +178,4 @@ fn complete(
         }
     }
     descriptions.map(|descriptions| names::fill(file, bus, descriptions)).transpose()
-}
-
-fn write(arguments: &InitArguments, text: &str) -> Result<(), Failure> {
-    let out = &arguments.out;
-    let mut opening = OpenOptions::new();
-    let opening = opening.write(true).truncate(true).create(true).create_new(!arguments.overwrite);
-    let written = opening.open(out).and_then(|mut file| file.write_all(text.as_bytes()));
-    written.map_err(|error| Failure::new(format!("{} cannot be written: {error}", out.display())))
 }

@@ -20,6 +20,7 @@ mod json;
 mod modules;
 mod numbers;
 mod others;
+mod out_file;
 mod output;
 mod recording;
 mod resend;

@@ -11,6 +11,7 @@ use std::io::{self, ErrorKind, IsTerminal, Write, stdout};
 use std::sync::OnceLock;
 use std::time::Duration;
 
+use ringcat_link::print::error_line;
 use ringcat_link::visible::{visible, visible_json};
 use serde::Serialize;
 
@@ -125,9 +126,9 @@ pub fn counted(count: usize, one: &str, more: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { more })
 }
 
-/// A line on the standard error output.
+/// A line on the standard error output, which may have been closed.
 pub fn complain(text: impl std::fmt::Display) {
-    eprintln!("{}", visible(&text.to_string()));
+    error_line(&text.to_string());
 }
 
 /// A warning on the standard error output, with the name of the program before it.

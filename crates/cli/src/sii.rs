@@ -1,7 +1,6 @@
 //! `ringcat sii`: EEPROM images from device descriptions (ESI), images compared with descriptions, descriptions from
 //! images. No interface is needed.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
@@ -17,6 +16,7 @@ use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::sii::{ComparedImage, Difference, SiiBuilt, SiiCompared, SiiSkeleton};
 use crate::numbers::{number_of_16_bits, number_of_32_bits};
+use crate::out_file::Overwrite;
 use crate::output::{counted, say, warn};
 use crate::verdict::{Report, Verdict};
 
@@ -74,6 +74,8 @@ struct BuildArguments {
     /// File to write
     #[arg(long, value_name = "FILE.bin", help_heading = "Output")]
     out: PathBuf,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 #[derive(Args, Debug)]
@@ -93,6 +95,8 @@ struct SkeletonArguments {
     /// File to write
     #[arg(long, value_name = "FILE.xml", help_heading = "Output")]
     out: PathBuf,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 impl SiiArguments {
@@ -116,6 +120,7 @@ pub fn run(arguments: &SiiArguments) -> Result<Report, Failure> {
 }
 
 fn built(arguments: &BuildArguments) -> Result<Report, Failure> {
+    arguments.overwrite.check(&arguments.out)?;
     let failed = |text: String| Failure::new(text);
     let esi = read(&arguments.device.esi)?;
     let device = arguments.device.choose(&esi)?;
@@ -131,7 +136,7 @@ fn built(arguments: &BuildArguments) -> Result<Report, Failure> {
     options.without_pdos = arguments.without_pdos;
     let image = build(&esi, device, &options).map_err(|error| failed(error.to_string()))?;
     let out = &arguments.out;
-    fs::write(out, &image.bytes).map_err(|error| failed(format!("{} cannot be written: {error}", out.display())))?;
+    arguments.overwrite.write(out, &image.bytes)?;
     image.notices.iter().for_each(warn);
     let (kind, revision) = (device.kind.trim().to_owned(), device.revision);
     let bytes = image.bytes.len();
@@ -290,12 +295,13 @@ fn lines(image: &ComparedImage) -> Vec<String> {
 }
 
 fn described(arguments: &SkeletonArguments) -> Result<Report, Failure> {
+    arguments.overwrite.check(&arguments.out)?;
     let path = &arguments.image;
     let failed = |text: String| Failure::new(format!("{}: {text}", path.display()));
     let bytes = image_of(path)?;
     let Skeleton { text: xml, notices } = skeleton(&bytes).map_err(|error| failed(error.to_string()))?;
     let out = &arguments.out;
-    fs::write(out, &xml).map_err(|error| Failure::new(format!("{} cannot be written: {error}", out.display())))?;
+    arguments.overwrite.write(out, xml.as_bytes())?;
     let held = format!("a description of {} bytes in {}", xml.len(), out.display());
     notices.iter().for_each(warn);
     Ok(Report { verdict: Verdict::Held(held), data: Data::SiiSkeleton(SiiSkeleton { bytes: xml.len(), notices }) })

@@ -31,7 +31,7 @@ pub mod numbers;
 pub mod options_help;
 mod order;
 pub mod progress;
-mod screen;
+pub mod screen;
 pub mod selection;
 pub mod selection_help;
 pub mod session;

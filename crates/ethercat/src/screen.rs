@@ -1,6 +1,7 @@
 //! A page that is drawn again and again at the same place of a terminal.
 
-use std::io;
+use std::fs::File;
+use std::io::{self, Write};
 use std::os::fd::AsFd;
 
 use ringcat_control::visible;
@@ -19,6 +20,23 @@ pub const END: &str = "\x1b[?25h\x1b[?1049l";
 /// Columns and rows of the terminal at the standard output.
 pub fn size() -> (u16, u16) {
     terminal::size(io::stdout().as_fd()).unwrap_or(USUAL)
+}
+
+/// Writes to the terminal at once, past buffers and locks. Errors are ignored: it may be closed.
+pub fn put(text: &str) {
+    if let Ok(terminal) = io::stdout().as_fd().try_clone_to_owned() {
+        let _ = File::from(terminal).write_all(text.as_bytes());
+    }
+}
+
+/// From now on a panic leaves the alternate screen and gives the terminal its settings back before its message.
+pub fn restore_at_panic() {
+    let before = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        terminal::restore();
+        put(END);
+        before(panic);
+    }));
 }
 
 /// Overwrites the screen with lines, cut at the last column. If they do not fit, the last row has the number of the

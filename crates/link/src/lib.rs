@@ -13,7 +13,8 @@
 //! * [`tap`]: TAP interfaces, network interfaces whose other end is this process;
 //! * [`monotonic`], [`realtime`]: the host's clock, scheduling, memory locking, processor latency;
 //! * [`operator`]: lines on the standard error and in the journal, without waiting;
-//! * [`terminal`]: its size, and keys one by one;
+//! * [`terminal`]: its size, and keys one by one; [`job`]: signals that stop and continue a program in it;
+//! * [`print`]: lines whose reader may leave;
 //! * [`visible`]: text for a terminal, with hidden characters as escape sequences;
 //! * [`signals`]: signals that request the end of a program;
 //! * [`pcapng`]: captures for Wireshark; [`recorder`]: writing captures during operation; [`sniffer`]: capturing an
@@ -32,6 +33,7 @@ pub mod filter;
 pub mod frame_pipe;
 pub mod heartbeat;
 pub mod interface;
+pub mod job;
 mod kernel;
 pub mod listener;
 pub mod monotonic;
@@ -39,6 +41,7 @@ pub mod operator;
 pub mod packet_socket;
 pub mod pcapng;
 mod permission;
+pub mod print;
 pub mod private_file;
 pub mod process;
 pub mod realtime;

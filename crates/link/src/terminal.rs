@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::mem::zeroed;
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd};
+use std::sync::OnceLock;
 use std::time::Duration;
 
 use crate::process::wait_readable;
@@ -31,6 +32,18 @@ pub enum Key {
 pub const CTRL_C: u8 = 3;
 /// Ctrl-D.
 pub const CTRL_D: u8 = 4;
+/// Ctrl-Z, which stops no program while [`Keys`] exists.
+pub const CTRL_Z: u8 = 26;
+/// Ctrl-\\, in the same way.
+pub const CTRL_BACKSLASH: u8 = 28;
+
+/// Settings of the standard input before the first [`Keys`].
+static BEFORE: OnceLock<libc::termios> = OnceLock::new();
+
+/// Gives the terminal the settings back that it had before [`Keys`]: for a hook of panics.
+pub fn restore() {
+    BEFORE.get().into_iter().for_each(set);
+}
 
 /// The standard input, key by key and without an echo where it is a terminal. It is as before when this is dropped.
 pub struct Keys {
@@ -53,13 +66,28 @@ impl Keys {
             let mut settings: libc::termios = zeroed();
             (libc::tcgetattr(input, &mut settings) == 0).then_some(settings)
         };
-        if let Some(mut settings) = before {
+        if let Some(before) = before {
+            // Only the first ones are those of the user.
+            let _ = BEFORE.set(before);
+        }
+        let keys = Keys { input: own.into(), before };
+        keys.resume();
+        Ok(keys)
+    }
+
+    /// Gives the terminal its settings back until [`Keys::resume`].
+    pub fn pause(&self) {
+        self.before.iter().for_each(set);
+    }
+
+    /// Switches to single keys again, also after a shell has changed the settings.
+    pub fn resume(&self) {
+        if let Some(mut settings) = self.before {
             settings.c_lflag &= !(libc::ICANON | libc::ECHO | libc::ISIG);
             settings.c_cc[libc::VMIN] = 1;
             settings.c_cc[libc::VTIME] = 0;
             set(&settings);
         }
-        Ok(Keys { input: own.into(), before })
     }
 
     /// The next byte, if one comes within this time.
@@ -79,9 +107,7 @@ impl Keys {
 
 impl Drop for Keys {
     fn drop(&mut self) {
-        if let Some(before) = &self.before {
-            set(before);
-        }
+        self.pause();
     }
 }
 

@@ -13,7 +13,8 @@
 //!   [`process_state`]: what the kernel shows of its process; [`owner_lock`]: what of it outlives the daemon;
 //! * [`listening`], [`session`], [`rights`]: clients, their requests and permissions;
 //! * [`daemon`]: all of it; [`running`]: from its start to its end; [`service_manager`]: messages to that; [`log`]:
-//!   lines for the operator.
+//!   lines for the operator;
+//! * [`service_control`]: the program `ethercatctl`.
 //!
 //! A thread serves each client, so one that is slow or hostile keeps nothing but its own thread. Decisions 0074 to
 //! 0076.
@@ -38,6 +39,7 @@ pub mod process_state;
 pub mod rights;
 pub mod running;
 pub mod segment_process;
+pub mod service_control;
 pub mod service_manager;
 pub mod session;
 pub mod setup;

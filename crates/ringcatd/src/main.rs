@@ -1,17 +1,17 @@
 //! The program `ringcatd`: see `ringcatd --help`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Parser;
 use ringcat_control::socket::to_listen_at;
-use ringcat_control::visible;
+use ringcat_link::print::{error_line, line};
 use ringcatd::conf::Conf;
 use ringcatd::conf::place::Place;
 use ringcatd::log::{flush, say};
 use ringcatd::running;
 use ringcatd::setup::{Setup, SetupOptions};
-use ringcatd::{check, opener, segment_process};
+use ringcatd::{check, opener, segment_process, service_control};
 
 /// Drives EtherCAT segments while no application does, and hands them over to applications.
 #[derive(Debug, Parser)]
@@ -47,12 +47,15 @@ enum Role {
 }
 
 fn main() -> ExitCode {
+    if is_called(service_control::NAME) {
+        return service_control::main();
+    }
     let arguments = Arguments::parse();
     if arguments.check {
         return match look(arguments) {
             Ok(()) => ExitCode::SUCCESS,
             Err(error) => {
-                eprintln!("{}", visible(&error));
+                error_line(&error);
                 ExitCode::from(2)
             }
         };
@@ -74,6 +77,11 @@ fn main() -> ExitCode {
     }
 }
 
+/// Whether this program was started under that name.
+fn is_called(name: &str) -> bool {
+    std::env::args_os().next().is_some_and(|called| Path::new(&called).file_name().is_some_and(|file| file == name))
+}
+
 fn run(arguments: Arguments) -> Result<(), String> {
     let conf = arguments.conf.as_deref().map(Conf::read).transpose().map_err(|error| error.to_string())?;
     running::run(&Setup::new(arguments.options, conf.unwrap_or_default())?)
@@ -86,11 +94,11 @@ fn look(arguments: Arguments) -> Result<(), String> {
     let file = match arguments.conf {
         None if is_named => None,
         None => {
-            println!("{}", visible(&place.to_string()));
+            print(&place.to_string())?;
             Some(place.path)
         }
         Some(named) => {
-            println!("{}, as --conf names it", visible(&named.display().to_string()));
+            print(&format!("{}, as --conf names it", named.display()))?;
             Some(named)
         }
     };
@@ -100,8 +108,12 @@ fn look(arguments: Arguments) -> Result<(), String> {
         Some(path) => path.display().to_string(),
         None => to_listen_at(|name| std::env::var_os(name))?.display().to_string(),
     };
-    for line in check::lines(&conf, &setup, &socket) {
-        println!("{}", visible(&line));
+    for understood in check::lines(&conf, &setup, &socket) {
+        print(&understood)?;
     }
     setup.check_interfaces()
+}
+
+fn print(text: &str) -> Result<(), String> {
+    line(text).map_err(|error| format!("the standard output: {error}"))
 }

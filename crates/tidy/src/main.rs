@@ -5,6 +5,8 @@
 //! `-- figures DIRECTORY` counts the files of another commit there.
 //! `cargo run -p tidy -- shrink` lowers `known.toml` to the current counts; it refuses if a count has grown.
 
+use std::fmt::Display;
+use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -18,7 +20,7 @@ fn main() -> ExitCode {
     let done = match std::env::args().nth(1).as_deref() {
         None => run(false),
         Some("shrink") => run(true),
-        Some("coverage") => tree().map(|tree| print!("{}", coverage::report(&tree))),
+        Some("coverage") => tree().map(|tree| put(coverage::report(&tree))),
         Some("figures") => match std::env::args().nth(2) {
             None => tree().and_then(|tree| figures(&tree)),
             Some(directory) => counted(Path::new(&directory)),
@@ -46,7 +48,7 @@ fn write_evidence(tree: &Tree) -> Result<(), Finding> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     for (path, text) in evidence::pages(tree) {
         std::fs::write(root.join(path), text).map_err(|error| Finding::new(path, 0, error.to_string()))?;
-        println!("wrote {path}");
+        put(format_args!("wrote {path}\n"));
     }
     Ok(())
 }
@@ -55,16 +57,16 @@ fn write_evidence(tree: &Tree) -> Result<(), Finding> {
 fn figures(tree: &Tree) -> Result<(), Finding> {
     let packet = dependencies::cargo_tree("packet").map_err(|error| Finding::new("Cargo.toml", 0, error))?;
     let (text, holds) = bars::text(&bars::rows(tree, &packet)?);
-    print!("{text}");
-    print!("{}", engine_lines::text(tree));
-    println!("        before: commit {}", bars::COMMIT_BEFORE);
+    put(text);
+    put(engine_lines::text(tree));
+    put(format_args!("        before: commit {}\n", bars::COMMIT_BEFORE));
     for allowed in words::ALLOWED {
-        println!("        allowed words in {}: {}", allowed.file, allowed.reason);
+        put(format_args!("        allowed words in {}: {}\n", allowed.file, allowed.reason));
     }
     for (what, bar, command) in bars::ELSEWHERE {
-        println!("        {what}: {command} (bar: {bar})");
+        put(format_args!("        {what}: {command} (bar: {bar})\n"));
     }
-    println!("{}", if holds { "all bars of the tree hold" } else { "bars are missed" });
+    put(format_args!("{}\n", if holds { "all bars of the tree hold" } else { "bars are missed" }));
     Ok(())
 }
 
@@ -72,7 +74,7 @@ fn figures(tree: &Tree) -> Result<(), Finding> {
 fn counted(directory: &Path) -> Result<(), Finding> {
     let name = directory.display().to_string();
     let tree = Tree::read(directory).map_err(|error| Finding::new(&name, 0, error.to_string()))?;
-    print!("{}{}", bars::Counted::of(&tree)?, engine_lines::Lines::of(&tree));
+    put(format_args!("{}{}", bars::Counted::of(&tree)?, engine_lines::Lines::of(&tree)));
     Ok(())
 }
 
@@ -86,7 +88,7 @@ fn run(shrink: bool) -> Result<(), Finding> {
     for rule in &RULES {
         let counts = (rule.count)(&tree)?;
         let (places, sum) = (counts.len(), counts.values().sum::<usize>());
-        println!("{}: {places} places, {sum} in all, {} known", rule.name, known.total(rule.name));
+        put(format_args!("{}: {places} places, {sum} in all, {} known\n", rule.name, known.total(rule.name)));
         if shrink && tree.file(PATH).is_some() && sum > known.total(rule.name) {
             return Err(Finding::new(PATH, 0, format!("{} has grown: correct it", rule.name)));
         }
@@ -103,13 +105,18 @@ fn chains(tree: &Tree) -> Result<(), Finding> {
     for name in crates(tree) {
         let graph = Graph::new(&arrows::of_crate(tree, &name)?);
         let chain = graph.longest_chain();
-        println!("{name}: longest chain of {} files", chain.len());
+        put(format_args!("{name}: longest chain of {} files\n", chain.len()));
         let below = format!("crates/{name}/src/");
         let names: Vec<&str> = chain.iter().map(|file| file.trim_start_matches(&below)).collect();
-        println!("    {}", names.join(" > "));
+        put(format_args!("    {}\n", names.join(" > ")));
         for circle in graph.circles() {
-            println!("    circle of {}: {}", circle.len(), circle.join(", "));
+            put(format_args!("    circle of {}: {}\n", circle.len(), circle.join(", ")));
         }
     }
     Ok(())
+}
+
+/// Prints a text. Its reader may have left: `cargo run -p tidy -- figures | head`.
+fn put(text: impl Display) {
+    let _ = std::io::stdout().write_all(text.to_string().as_bytes());
 }

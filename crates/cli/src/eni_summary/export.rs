@@ -1,8 +1,6 @@
 //! `ringcat eni export`: an ENI of a network file, or of another ENI.
 
 use std::collections::HashMap;
-use std::fs::{self, OpenOptions};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{ArgGroup, Args, ValueEnum};
@@ -13,6 +11,7 @@ use ringcat::network::LoadedNetwork;
 use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::eni::{EniExport, LeftOut};
+use crate::out_file::Overwrite;
 use crate::output::{self, counted, say, warn};
 use crate::verdict::{Report, Verdict};
 
@@ -53,9 +52,8 @@ pub struct ExportArguments {
     /// File to write; without it, or with -, the standard output
     #[arg(long, value_name = "FILE.xml", default_value = STANDARD_OUTPUT, help_heading = "Output")]
     out: PathBuf,
-    /// Replace the file if it exists
-    #[arg(long, help_heading = "Output")]
-    overwrite: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 /// Use of LRW.
@@ -116,8 +114,8 @@ pub fn run(arguments: &ExportArguments) -> Result<Report, Failure> {
     if is_standard && output::is_json() {
         return Err(Failure::new("with --json the standard output is for JSON: name a file with --out"));
     }
-    if !is_standard && !arguments.overwrite && fs::symlink_metadata(out).is_ok() {
-        return Err(Failure::new(format!("{} exists: name another file, or add --overwrite", out.display())));
+    if !is_standard {
+        arguments.overwrite.check(out)?;
     }
     let export = made(arguments)?;
     let subdevices = &export.configuration.subdevices;
@@ -125,7 +123,7 @@ pub fn run(arguments: &ExportArguments) -> Result<Report, Failure> {
     if is_standard {
         output::write_file(&export.text);
     } else {
-        write(arguments, &export.text)?;
+        arguments.overwrite.write(out, export.text.as_bytes())?;
     }
     let declaration = &export.configuration.declaration;
     let (subdevices, variables) = (declaration.subdevices.len(), export.configuration.image.variables.len());
@@ -163,12 +161,4 @@ fn made(arguments: &ExportArguments) -> Result<Export, Failure> {
     let path = arguments.eni.as_deref().ok_or_else(|| Failure::new("expected --network FILE or --eni FILE"))?;
     let file = EniFile::load(path).map_err(|error| Failure::new(error.to_string()))?;
     export(&file.configuration, &ExportDetails::of(&file.eni), &options).map_err(|error| failed(path, error))
-}
-
-fn write(arguments: &ExportArguments, text: &str) -> Result<(), Failure> {
-    let out = &arguments.out;
-    let mut opening = OpenOptions::new();
-    let opening = opening.write(true).truncate(true).create(true).create_new(!arguments.overwrite);
-    let written = opening.open(out).and_then(|mut file| file.write_all(text.as_bytes()));
-    written.map_err(|error| Failure::new(format!("{} cannot be written: {error}", out.display())))
 }

@@ -351,7 +351,17 @@ fn images_are_built_compared_and_described_again() {
         let is_said = invalid.verdict().contains("wrong.bin is invalid: ") && invalid.verdict().contains(reason);
         assert!(invalid.code == Some(1) && is_said, "{}", invalid.all());
     }
-    let unknown = ringcat(&["sii", "build", &acme, "--type", "AD09", "--out", &image]);
+    let before = (bytes.clone(), place.read("again.xml"));
+    for refused in [
+        ringcat(&["sii", "build", &acme, "--type", "AD08", "--out", &image]),
+        ringcat(&["sii", "skeleton", &image, "--out", &place.path("again.xml")]),
+    ] {
+        assert!(refused.code == Some(2) && refused.verdict().contains("or add --overwrite"), "{}", refused.all());
+    }
+    assert_eq!((fs::read(&image).expect("it is there"), place.read("again.xml")), before);
+    let again = ["sii", "skeleton", &image, "--overwrite", "--out", &place.path("again.xml")];
+    assert_eq!(ringcat(&again).code, Some(0));
+    let unknown = ringcat(&["sii", "build", &acme, "--type", "AD09", "--out", &place.path("none.bin")]);
     assert!(
         unknown.code == Some(2) && unknown.all().contains("there is no such device: type \"AD09\""),
         "{}",
@@ -359,7 +369,7 @@ fn images_are_built_compared_and_described_again() {
     );
     let odd =
         place.write("odd.xml", &fs::read_to_string(&acme).unwrap().replacen("<Su Frame", "<Su Foo=\"1\" Frame", 1));
-    let noted = ringcat(&["sii", "build", &odd, "--type", "AD08", "--out", &image]);
+    let noted = ringcat(&["sii", "build", &odd, "--type", "AD08", "--overwrite", "--out", &image]);
     assert!(noted.code == Some(0) && noted.errors.contains("odd.xml: line 31: Su@Foo is not known"), "{}", noted.all());
 }
 

@@ -50,3 +50,16 @@ fn control_characters_of_files_and_their_names_do_not_reach_the_terminal() {
     let said = ringcat(&["eni", &eni]);
     assert!(said.verdict().contains("eni\\u{1b}[2J\\r.xml: line 2"), "{}", said.all());
 }
+
+// covers: verdict
+#[test]
+fn readers_of_both_outputs_may_leave() {
+    for (command, code) in [(&["scan", "--main", "no-such"][..], 2), (&["esi", "show", "no-such"], 2), (&["--help"], 0)]
+    {
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        let mut ringcat = std::process::Command::new(env!("CARGO_BIN_EXE_ringcat"));
+        ringcat.args(command).stderr(writer.try_clone().expect("a descriptor")).stdout(writer);
+        assert_eq!(ringcat.status().expect("it starts").code(), Some(code), "{command:?}");
+    }
+}

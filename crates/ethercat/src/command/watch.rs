@@ -10,7 +10,8 @@ use ringcat_control::client::ClientError;
 use ringcat_control::message::{Answer, MasterState, Query};
 use ringcat_control::tool::{CycleReport, ToolAnswer, ToolQuery};
 use ringcat_link::HeldSignals;
-use ringcat_link::terminal::{CTRL_C, CTRL_D, Key, Keys};
+use ringcat_link::job::{HeldJobSignals, JobSignal};
+use ringcat_link::terminal::{CTRL_BACKSLASH, CTRL_C, CTRL_D, CTRL_Z, Key, Keys};
 
 use super::watched::{Watched, lines};
 use crate::failure::{Failure, unexpected};
@@ -34,8 +35,9 @@ its domains and its clocks; then a line for each slave, with the difference
 from the reference clock where it has one.
 
 In a terminal the table is drawn twice a second at the same place, until q,
-Ctrl-C or the end of the input. Elsewhere, and with --once, it is printed
-once. Not a command of IgH.
+Ctrl-C or the end of the input. Ctrl-Z stops the command until a shell
+continues it. Elsewhere, and with --once, the table is printed once. Not a
+command of IgH.
 ",
     options: "  --once                 Print the table once.
 ",
@@ -58,7 +60,8 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     }
     // A failure of the first table is reported on the normal screen.
     let first = table(session, &mut before)?;
-    let end = Rc::new(RefCell::new(End { signals: HeldSignals::hold(), keys: Keys::start()? }));
+    screen::restore_at_panic();
+    let end = Rc::new(RefCell::new(End::start()?));
     let meanwhile = Rc::clone(&end);
     session.check_meanwhile(LOOK, Box::new(move || meanwhile.borrow_mut().check(Duration::ZERO)));
     session.write(screen::BEGIN.as_bytes())?;
@@ -71,24 +74,55 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     watched.and(left)
 }
 
-/// What ends the table: keys and signals.
+/// What ends or interrupts the table: keys and signals.
 struct End {
     signals: HeldSignals,
+    jobs: HeldJobSignals,
     keys: Keys,
+    /// Number of times that the program was stopped: the screen was that of others meanwhile.
+    stops: u32,
 }
 
 impl End {
+    fn start() -> io::Result<End> {
+        Ok(End { signals: HeldSignals::hold(), jobs: HeldJobSignals::hold(), keys: Keys::start()?, stops: 0 })
+    }
+
     /// Waits so long for a key that ends the table, and looks for signals.
     fn check(&mut self, limit: Duration) -> ControlFlow<()> {
-        let is_over = match self.keys.next(limit) {
-            Some(Key::Byte(byte)) => matches!(byte, b'q' | b'Q' | CTRL_C | CTRL_D),
+        let pressed = self.keys.next(limit);
+        let signal = self.jobs.next();
+        if pressed == Some(Key::Byte(CTRL_Z)) || signal == Some(JobSignal::Stop) {
+            self.stop();
+        } else if signal == Some(JobSignal::Continue) {
+            self.go_on();
+        }
+        let is_over = match pressed {
+            Some(Key::Byte(byte)) => matches!(byte, b'q' | b'Q' | CTRL_C | CTRL_D | CTRL_BACKSLASH),
             Some(Key::End) => true,
             None => false,
         };
-        match is_over || self.signals.wait(Duration::ZERO).is_some() {
+        match is_over || signal == Some(JobSignal::Quit) || self.signals.wait(Duration::ZERO).is_some() {
             true => ControlFlow::Break(()),
             false => ControlFlow::Continue(()),
         }
+    }
+}
+
+impl End {
+    /// Gives the terminal back, and stops until the shell continues this program.
+    fn stop(&mut self) {
+        screen::put(screen::END);
+        self.keys.pause();
+        self.jobs.stop();
+        self.go_on();
+    }
+
+    /// Takes the terminal again.
+    fn go_on(&mut self) {
+        self.keys.resume();
+        screen::put(screen::BEGIN);
+        self.stops = self.stops.wrapping_add(1);
     }
 }
 
@@ -101,14 +135,14 @@ fn draw(
 ) -> Result<(), Failure> {
     let (mut drawn, mut asked) = (None, Instant::now());
     loop {
-        let size = screen::size();
+        let size = (screen::size(), end.borrow().stops);
         if asked.elapsed() >= REFRESH {
             asked = Instant::now();
             (table_now, drawn) = (table(session, before)?, None);
         }
         if drawn != Some(size) {
             drawn = Some(size);
-            session.write(screen::page(&table_now, size).as_bytes())?;
+            session.write(screen::page(&table_now, size.0).as_bytes())?;
             session.flush()?;
         }
         if end.borrow_mut().check(LOOK).is_break() {

@@ -11,6 +11,7 @@ use ringcat::sim::application::dictionary::{Access, Object};
 use ringcat::sim::cable::{CableId, DeviceIndex};
 
 use ringcat::sim::fault::Fault;
+use ringcat_link::terminal::Keys;
 
 use crate::bench::{Bench, Driver, LONG, PROGRAM, directory};
 use crate::golden_bus::{WITH_SOE, segment};
@@ -70,6 +71,14 @@ impl Terminal {
             assert!(begin.elapsed() < LONG, "no {text:?} in {:?}", shown.get(from..));
             std::thread::sleep(Duration::from_millis(5));
         }
+    }
+
+    /// Waits for texts one behind the other, behind the first `from` bytes; where the last one ends.
+    fn wait_for_all(&self, texts: &[&str], from: usize) -> usize {
+        texts.iter().fold(from, |from, text| {
+            self.wait_for(text, from);
+            from + self.shown()[from..].find(text).expect("it has come") + text.len()
+        })
     }
 
     fn press(&mut self, keys: &[u8]) {
@@ -186,7 +195,7 @@ fn a_live_table_follows_the_bus_and_the_size_of_the_terminal() {
 #[test]
 fn a_live_table_ends_with_keys_the_end_of_the_input_and_a_signal() {
     let bench = Bench::start(vec![ring(2, false)]);
-    for keys in [&b"\x03"[..], b"\x04", b"Q"] {
+    for keys in [&b"\x03"[..], b"\x04", b"Q", b"\x1c"] {
         let mut terminal = Terminal::start(&bench, "$E watch");
         terminal.wait_for("Master0  idle", 0);
         terminal.press(keys);
@@ -203,6 +212,74 @@ fn a_live_table_ends_with_keys_the_end_of_the_input_and_a_signal() {
     assert!(shown.ends_with("\u{1b}[?1049l"), "{shown:?}");
     let after = std::fs::read_to_string(bench.directory.join("after")).expect("it is there");
     assert!(after.contains(" icanon") && after.contains(" echo ") && after.contains("isig"), "{after}");
+}
+
+/// Variable of the process that panics.
+const PANICS: &str = "RINGCAT_TEST_PANIC";
+
+// covers: daemon
+#[test]
+fn a_panic_gives_the_terminal_back_before_its_message() {
+    if std::env::var_os(PANICS).is_some() {
+        ethercat::screen::restore_at_panic();
+        // It is not given back in the usual way.
+        std::mem::forget(Keys::start());
+        ethercat::screen::put(ethercat::screen::BEGIN);
+        panic!("on purpose");
+    }
+    let bench = Bench::start(vec![ring(2, false)]);
+    let own = std::env::current_exe().expect("a test has a file");
+    let name = "terminal::a_panic_gives_the_terminal_back_before_its_message";
+    let shown = in_terminal(
+        &bench,
+        &format!("{PANICS}=1 {} --exact {name} --nocapture --test-threads 1; stty -a > after", own.display()),
+    );
+    let left = shown.rsplit("\u{1b}[?1049h\u{1b}[?25l").next().expect("a part");
+    assert!(left.starts_with("\u{1b}[?25h\u{1b}[?1049l") && left.contains("on purpose"), "{shown:?}");
+    assert!(is_usual(&std::fs::read_to_string(bench.directory.join("after")).expect("it is there")));
+}
+
+/// Whether `stty -a` shows a terminal that edits lines.
+fn is_usual(settings: &str) -> bool {
+    ["icanon", "echo", "isig"].iter().all(|wanted| settings.split_whitespace().any(|word| word == *wanted))
+}
+
+// covers: daemon
+#[test]
+fn a_live_table_that_is_stopped_gives_the_terminal_back_and_is_drawn_again() {
+    const END: &str = "\u{1b}[?25h\u{1b}[?1049l";
+    const AGAIN: &str = "\u{1b}[?1049h\u{1b}[?25l\u{1b}[HMaster0  idle";
+    let bench = Bench::start(vec![ring(2, false)]);
+    let file = |name: &str| std::fs::read_to_string(bench.directory.join(name)).unwrap_or_default();
+    let shell = "set -m; sh -c 'echo $$ > pid; exec $E watch'; stty -a > stopped; echo $? > code; fg > /dev/null";
+    let last = "stty sane; echo > sane; fg > /dev/null; stty -a > after";
+    // By a signal, and by the key.
+    let mut terminal = Terminal::start(&bench, &format!("{shell}; stty -a > again; fg > /dev/null; {last}"));
+    let at = terminal.wait_for_all(&[AGAIN], 0);
+    let kill = |signal: &str| {
+        let sent = Command::new("kill").args([signal, file("pid").trim()]).status();
+        assert!(sent.expect("it is there").success());
+    };
+    kill("-TSTP");
+    let at = terminal.wait_for_all(&[END, AGAIN], at);
+    assert!(is_usual(&file("stopped")), "{}", file("stopped"));
+    terminal.press(b"\x1a");
+    let at = terminal.wait_for_all(&[END, AGAIN], at);
+    assert!(is_usual(&file("again")), "{}", file("again"));
+    // SIGSTOP cannot be received: the table takes the terminal again when it goes on.
+    let tty = file("tty");
+    let stty = |arguments: &[&str]| {
+        let done = Command::new("stty").args(["-F", tty.trim()]).args(arguments).output().expect("coreutils are there");
+        String::from_utf8_lossy(&done.stdout).into_owned()
+    };
+    kill("-STOP");
+    bench.wait_until("the shell", || bench.directory.join("sane").exists());
+    bench.wait_until("the terminal is taken again", || stty(&["-a"]).contains("-icanon"));
+    terminal.wait_for_all(&[AGAIN], at);
+    kill("-QUIT");
+    let (shown, _) = terminal.end();
+    assert!(shown.ends_with("\u{1b}[?25h\u{1b}[?1049l"), "{shown:?}");
+    assert!(is_usual(&file("after")), "{}", file("after"));
 }
 
 // covers: daemon

@@ -21,7 +21,7 @@ impl Root {
         let directory = directory();
         let shell = directory.join("programs/shell");
         std::fs::create_dir_all(shell.join("man8")).expect("it can be made");
-        for program in ["ringcat", "ethercat", "ringcatd", "ethercatctl"] {
+        for program in ["ringcat", "ethercat", "ringcatd"] {
             std::fs::copy("/bin/sleep", directory.join("programs").join(program)).expect("sleep is there");
         }
         for file in ["man8/ethercat.8", "man8/ethercat-slaves.8", "ethercat.bash", "_ethercat", "ethercat.fish"] {
@@ -128,8 +128,9 @@ fn all_files_are_installed_in_the_places_of_a_distribution_and_removed_again() {
     let about = root.install(&["--prefix", "/usr"]);
     let expected: BTreeSet<String> = OF_A_DISTRIBUTION.iter().map(ToString::to_string).collect();
     assert_eq!(root.files(), expected);
-    assert!(about.contains("24 files") && !about.contains("next:"), "{about}");
-    // The list of the files is the only one that is not counted.
+    assert!(about.contains("23 files") && !about.contains("next:"), "{about}");
+    assert_eq!(std::fs::read_link(root.path("/usr/sbin/ethercatctl")).expect("a link"), Path::new("ringcatd"));
+    // The list of the files and the link are the only ones that are not counted.
     assert_eq!(expected.len(), 25);
     said(&root.run(&["--prefix", "/usr", "--uninstall"]), true);
     assert!(root.is_empty(), "{:?}", root.files());
@@ -320,6 +321,33 @@ fn files_of_a_package_are_neither_replaced_nor_removed() {
     let left: BTreeSet<String> = root.files().into_iter().filter(|file| !file.starts_with("/var/lib/dpkg")).collect();
     assert_eq!((left, root.text(conf)), (BTreeSet::from([conf, tool].map(String::from)), before));
     assert_eq!(root.text(tool), "the tool of a package\n");
+}
+
+// covers: daemon
+#[test]
+fn a_removal_disables_its_own_units_and_leaves_those_of_a_package_enabled() {
+    let root = Root::new();
+    let wants = "/etc/systemd/system/multi-user.target.wants";
+    let links = |prefix: &str| {
+        root.write(&format!("{wants}/other.service"), "of another");
+        for (name, unit) in [("ethercat", "ethercat"), ("ringcat-standby@left", "ringcat-standby@")] {
+            let link = root.path(&format!("{wants}/{name}.service"));
+            let _ = std::fs::remove_file(&link);
+            let unit = format!("{prefix}/lib/systemd/system/{unit}.service");
+            std::os::unix::fs::symlink(unit, link).expect("it can be made");
+        }
+    };
+    let enabled = || {
+        let all = std::fs::read_dir(root.path(wants)).expect("it is there");
+        all.flatten().map(|it| it.file_name().into_string().expect("text")).collect::<BTreeSet<String>>()
+    };
+    let all = BTreeSet::from(["ethercat.service", "other.service", "ringcat-standby@left.service"].map(String::from));
+    for (of, left) in [("/usr", all), ("/usr/local", BTreeSet::from(["other.service".to_owned()]))] {
+        root.install(&["--prefix", "/usr/local"]);
+        links(of);
+        said(&root.run(&["--prefix", "/usr/local", "--uninstall"]), true);
+        assert_eq!(enabled(), left, "units of {of}");
+    }
 }
 
 // covers: daemon

@@ -111,6 +111,26 @@ fn systemd_makes_the_group_and_the_directory_of_the_package() {
 
 // covers: daemon
 #[test]
+fn scripts_of_the_packages_have_no_warnings_and_pages_no_mistakes() {
+    let maintainers = ["ringcat.postinst", "ringcat.postrm", "ringcat.preinst", "ringcat.prerm"];
+    let mut scripts = vec![file("install"), file("deb"), file("../crates/ffi/install")];
+    scripts.extend(maintainers.map(|name| file("debian").join(name)));
+    scripts.push(file("debian/libethercat1-dev.preinst"));
+    let pages = ["ethercatctl.8", "ringcat.1", "ringcatd.8"].map(|name| file("man").join(name));
+    let severe = ["--severity=warning"];
+    for (program, options, files) in
+        [("shellcheck", &severe[..], &scripts[..]), ("mandoc", &["-Tlint", "-Wwarning"], &pages)]
+    {
+        for path in files {
+            let arguments = [options, &[path.to_str().expect("text")]].concat();
+            let Some(checked) = run(program, &arguments) else { break };
+            assert!(checked.status.success(), "{}: {}", path.display(), said(&checked));
+        }
+    }
+}
+
+// covers: daemon
+#[test]
 fn the_init_script_has_the_verbs_of_the_manual_and_its_header() {
     let script = text("ethercat.init");
     for key in ["Provides: ", "Required-Start: ", "Required-Stop: ", "Default-Start: ", "Default-Stop: "] {

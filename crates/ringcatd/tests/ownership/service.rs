@@ -1,10 +1,15 @@
 //! The program as a service: its configuration file, and what the service manager is reported.
 
 use std::ffi::OsString;
-use std::os::unix::net::UnixDatagram;
+use std::io::{Read, Write};
+use std::os::unix::net::{UnixDatagram, UnixListener};
+use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
+
+use ringcat_control::Content;
+use ringcat_control::wire::{VERSION, encode};
 
 use crate::bench::{LONG, directory, ring, turn};
 use crate::program::fails;
@@ -139,6 +144,113 @@ fn the_service_manager_gets_ready_state_life_and_end() {
     manager.wait_until("it ends", |seen| seen.iter().any(|line| line == "STOPPING=1"));
     assert_eq!(manager.seen.iter().filter(|line| *line == "READY=1").count(), 1);
     assert!(running.child.wait().expect("it ends").success());
+}
+
+/// Socket of the process that is a daemon of another version.
+const OF_ANOTHER_VERSION: &str = "RINGCAT_TEST_ANOTHER_VERSION";
+
+/// A daemon of another version: the test program again, under the name of the daemon.
+fn another_version(directory: &Path) -> Child {
+    let program = directory.join("ringcatd");
+    let own = std::env::current_exe().expect("a test has a file");
+    std::os::unix::fs::symlink(own, &program).expect("it is free");
+    let mut daemon = Command::new(program);
+    daemon.args(["--exact", "service::ethercatctl_queries_and_stops_a_daemon_of_another_version", "--nocapture"]);
+    daemon.env(OF_ANOTHER_VERSION, directory.join("socket")).stdout(Stdio::null());
+    let daemon = daemon.spawn().expect("it is a program");
+    let begin = Instant::now();
+    while !directory.join("socket").exists() {
+        assert!(begin.elapsed() < LONG, "it listens");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    daemon
+}
+
+/// What that process does, until it is ended.
+fn be_of_another_version(socket: &Path) -> ! {
+    let listener = UnixListener::bind(socket).expect("it is free");
+    let mut message = encode(&Content::Hello { program: "another".to_owned() }.into()).expect("it is short");
+    message[4..6].copy_from_slice(&(VERSION - 1).to_le_bytes());
+    loop {
+        let (mut stream, _) = listener.accept().expect("a client comes");
+        // A client that only connects leaves at once.
+        let _ = stream.write_all(&message).and_then(|()| stream.read(&mut [0; 256]));
+    }
+}
+
+// covers: daemon
+#[test]
+fn ethercatctl_queries_and_stops_a_daemon_of_another_version() {
+    if let Some(socket) = std::env::var_os(OF_ANOTHER_VERSION) {
+        be_of_another_version(Path::new(&socket));
+    }
+    let (_turn, directory) = (turn(), directory());
+    let further = format!("RINGCAT_SOCKET=\"{}\"\n", directory.join("socket").display());
+    let conf = file(&directory, &[3], &further);
+    let mut daemon = another_version(&directory);
+    let (code, said) = control(&conf, "status");
+    let expected = format!("ringcatd runs (process {})\nit has control version {}, ", daemon.id(), VERSION - 1);
+    assert!(code == Some(0) && said.starts_with(&expected) && said.contains("ethercatctl restart"), "{said}");
+    let (code, said) = control(&conf, "start");
+    assert!(code == Some(0) && said.contains("runs already") && said.contains("ethercatctl restart"), "{said}");
+    assert!(daemon.try_wait().expect("it is a child").is_none());
+    // It ends by the signal, while a thread here waits for it: a process that has ended is there until then.
+    let wait = std::thread::spawn(move || daemon.wait().expect("it is a child").signal());
+    let (code, said) = control(&conf, "restart");
+    assert_eq!((code, wait.join().expect("no panic")), (Some(0), Some(15)), "{said}");
+    assert!(control(&conf, "status").1.contains("): idle\n"));
+    assert_eq!(control(&conf, "stop").0, Some(0));
+    std::fs::remove_dir_all(directory).expect("it is there");
+}
+
+// covers: daemon
+#[test]
+fn ethercatctl_ends_no_process_that_is_no_daemon() {
+    let (_turn, directory) = (turn(), directory());
+    let socket = directory.join("socket");
+    let conf = file(&directory, &[3], &format!("RINGCAT_SOCKET=\"{}\"\n", socket.display()));
+    let listener = UnixListener::bind(&socket).expect("it is free");
+    std::thread::spawn(move || listener.incoming().for_each(drop));
+    for verb in ["status", "stop", "restart", "start"] {
+        let (code, said) = control(&conf, verb);
+        let expected = format!("process {}, which listens at {}, is ", std::process::id(), socket.display());
+        assert!(code == Some(1) && said.contains(&expected) && said.ends_with(" and not ringcatd\n"), "{said}");
+    }
+    std::fs::remove_dir_all(directory).expect("it is there");
+}
+
+// covers: daemon
+#[test]
+fn a_reader_of_the_output_may_leave() {
+    let (_turn, directory) = (turn(), directory());
+    let conf = file(&directory, &[3], "");
+    for (program, arguments, good) in [
+        (PROGRAM, &["--check", "--conf", &conf][..], 0),
+        (PROGRAM, &["--check", "--conf", "/nonexistent"], 2),
+        (env!("CARGO_BIN_EXE_ethercatctl"), &["check", "--conf", &conf], 0),
+        (env!("CARGO_BIN_EXE_ethercatctl"), &["status", "--conf", &conf], 3),
+        (env!("CARGO_BIN_EXE_ethercatctl"), &["start", "--conf", "/nonexistent"], 1),
+    ] {
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        let mut command = Command::new(program);
+        command.args(arguments).env("RINGCAT_SOCKET", directory.join("socket"));
+        command.stderr(writer.try_clone().expect("a descriptor")).stdout(writer);
+        assert_eq!(command.status().expect("it starts").code(), Some(good), "{program} {arguments:?}");
+    }
+    std::fs::remove_dir_all(directory).expect("it is there");
+}
+
+// covers: daemon
+#[test]
+fn the_daemon_under_the_name_ethercatctl_is_that_program() {
+    let directory = directory();
+    let link = directory.join("ethercatctl");
+    std::os::unix::fs::symlink(PROGRAM, &link).expect("it is free");
+    let said = |program: &Path| Command::new(program).arg("--help").output().expect("it starts").stdout;
+    assert_eq!(said(&link), said(Path::new(env!("CARGO_BIN_EXE_ethercatctl"))));
+    assert_ne!(said(&link), said(Path::new(PROGRAM)));
+    std::fs::remove_dir_all(directory).expect("it is there");
 }
 
 /// The exit code and what was printed on both streams.
