@@ -9,12 +9,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, Weak};
 use std::time::{Duration, Instant};
 
-use ringcat::daemon::{BusLog, ClientError, DaemonError, Followed, OwnedBus, OwnershipWatch, Refusal};
+use ringcat::daemon::{
+    BusLog, BusSettings, ClientError, DaemonError, Followed, OwnedBus, OwnershipWatch, Refusal, options_with,
+};
 use ringcat::{Options, Retries, SubDeviceInfo, SupervisorThread, realtime};
 
 use crate::any_links::{self, AnyLinks};
 use crate::code::{Code, Outcome, report, report_as};
-use crate::environment::{program_name, source};
+use crate::environment::{program_name, settings, source};
 use crate::host::{HeldSignals, generation, memory_hint, variable};
 use crate::locks::locked;
 use crate::responder::{DaemonResponder, Responder, code_of};
@@ -44,8 +46,17 @@ pub struct Bus {
     _owned: Mutex<Option<OwnedBus>>,
     /// Of a bus from a daemon.
     ownership: Option<OwnershipWatch>,
+    settings: BusSettings,
     responder: Arc<Responder>,
     is_reserved: AtomicBool,
+}
+
+/// Where a bus comes from.
+enum Origin {
+    /// This process has opened its links; the settings of variables.
+    Here(BusSettings),
+    /// A daemon.
+    Daemon(Box<OwnedBus>),
 }
 
 /// Why a daemon does not hand a bus over.
@@ -135,10 +146,14 @@ impl Bus {
                  segment file), got neither"
             )
         })?;
+        let (settings, mistakes) = settings(variable);
+        if !mistakes.is_empty() {
+            return Err(mistakes.join("; "));
+        }
         let (cyclic, acyclic) = any_links::open(&source)?;
-        let started = SupervisorThread::start(acyclic, &options, realtime::leave);
+        let started = SupervisorThread::start(acyclic, &options_with(&settings, &options), realtime::leave);
         let supervisor = started.map_err(|error| format!("{error}{}", memory_hint()))?;
-        Bus::with(master, supervisor, cyclic, None)
+        Bus::with(master, supervisor, cyclic, Origin::Here(settings))
     }
 
     fn of_daemon(socket: &Path, master: u32) -> Result<Bus, TakeError> {
@@ -147,17 +162,18 @@ impl Bus {
         let mut owned = OwnedBus::take(socket, master, &program_name(), &options, realtime::leave)?;
         let other = |text: String| TakeError::Other(Code::GONE, text);
         let links = owned.take_links().ok_or_else(|| other("the daemon has handed over no links".to_owned()))?;
-        Bus::with(master, owned.supervisor().clone(), AnyLinks::First(links), Some(owned)).map_err(other)
+        let (supervisor, cyclic) = (owned.supervisor().clone(), AnyLinks::First(links));
+        Bus::with(master, supervisor, cyclic, Origin::Daemon(Box::new(owned))).map_err(other)
     }
 
-    fn with(
-        master: u32,
-        supervisor: SupervisorThread,
-        cyclic: AnyLinks,
-        owned: Option<OwnedBus>,
-    ) -> Result<Bus, String> {
+    fn with(master: u32, supervisor: SupervisorThread, cyclic: AnyLinks, origin: Origin) -> Result<Bus, String> {
+        let (settings, owned) = match origin {
+            Origin::Here(settings) => (settings, None),
+            Origin::Daemon(owned) => (owned.settings().clone(), Some(*owned)),
+        };
         let ownership = owned.as_ref().map(|owned| owned.ownership().clone());
         let followed = Followed::new(supervisor.clone()).with_ownership(ownership.clone());
+        let followed = followed.with_cyclic_lines(settings.prints_cyclic_lines);
         let log = BusLog::start(followed, realtime::leave, move |priority, line| match master {
             0 => report_as(priority, format_args!("{line}")),
             _ => report_as(priority, format_args!("master {master}: {line}")),
@@ -167,12 +183,28 @@ impl Bus {
         let generation = generation();
         let (responder, is_reserved) = (Arc::new(Responder::Here(supervisor.clone())), AtomicBool::new(false));
         let _owned = Mutex::new(owned);
-        Ok(Bus { master, generation, _log, supervisor, cyclic_links, _owned, ownership, responder, is_reserved })
+        Ok(Bus {
+            master,
+            generation,
+            _log,
+            supervisor,
+            cyclic_links,
+            _owned,
+            ownership,
+            settings,
+            responder,
+            is_reserved,
+        })
     }
 
     /// Number of the master.
     pub fn master(&self) -> u32 {
         self.master
+    }
+
+    /// Settings of the master.
+    pub fn settings(&self) -> &BusSettings {
+        &self.settings
     }
 
     /// The acyclic half.

@@ -35,6 +35,7 @@ mod received;
 mod receiver;
 mod refusing;
 pub mod serving;
+mod settings;
 mod tool;
 
 pub use application::socket;
@@ -48,5 +49,7 @@ pub use ringcat_control::client::{Client, ClientError};
 pub use ringcat_control::message::SegmentOverview;
 pub use ringcat_control::message::{Answer, HandedBus, HandedLink, HandedLinks, MasterState, Query, Right};
 pub use ringcat_control::refusal::{Refusal, ServiceFault};
+pub use ringcat_control::settings::BusSettings;
 pub use ringcat_control::socket::to_connect_to as find_socket;
 pub use ringcat_control::tool as known;
+pub use settings::options_with;

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use ringcat::daemon::{BusLog, Followed, Lines, adopt_links, serving};
+use ringcat::daemon::{BusLog, BusSettings, Followed, Lines, adopt_links, options_with, serving};
 use ringcat::eoe::{Ethernet, EthernetEvent, EthernetOptions};
 use ringcat::foreign::{ListeningPhase, ListeningState, QuietLinks};
 use ringcat::{
@@ -39,6 +39,8 @@ pub struct Lasting<'a> {
     pub lines: Arc<Mutex<Lines>>,
     /// Level of messages.
     pub debug_level: u32,
+    /// What holds for whatever drives the master.
+    pub settings: &'a BusSettings,
     /// Network interfaces of EoE; `None`: there are none.
     pub interfaces: Option<Arc<EthernetInterfaces>>,
     /// Frames received on the links: nothing is sent before.
@@ -66,7 +68,7 @@ impl Driving {
         let main_address = acyclic.addresses().main.0;
         let acyclic = QuietLinks::new(acyclic, cyclic, lasting.listened.clone(), opened.clone());
         let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
-        let options = options.with_dictionaries(true);
+        let options = options_with(lasting.settings, &options).with_dictionaries(true);
         let supervisor = match Knowledge::from_bytes(lasting.knowledge) {
             Ok(knowledge) => SupervisorThread::start_resumed(acyclic, &options, (knowledge, handover), || ()),
             // Nothing is known yet.
@@ -76,6 +78,7 @@ impl Driving {
         let level = LogFilter::new(LogLevel::from_number(lasting.debug_level));
         supervisor.set_log_filter(level).map_err(|error| error.to_string())?;
         let followed = Followed::new(supervisor.clone()).with_lines(lasting.lines.clone());
+        let followed = followed.with_cyclic_lines(lasting.settings.prints_cyclic_lines);
         let number = lasting.number;
         let log = BusLog::start(
             followed,

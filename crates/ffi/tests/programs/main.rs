@@ -21,3 +21,4 @@ mod operator;
 mod readme;
 mod realtime;
 mod shape;
+mod switches;

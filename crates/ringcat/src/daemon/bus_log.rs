@@ -39,18 +39,28 @@ pub struct Followed {
     supervisor: SupervisorThread,
     ownership: Option<OwnershipWatch>,
     lines: Arc<Mutex<Lines>>,
+    /// Also what cyclic frames show.
+    with_cyclic: bool,
 }
 
 impl Followed {
     /// The acyclic half of a bus. All its events are taken from it.
     pub fn new(supervisor: SupervisorThread) -> Followed {
-        Followed { supervisor, ownership: None, lines: Arc::default() }
+        Followed { supervisor, ownership: None, lines: Arc::default(), with_cyclic: true }
     }
 
     /// Also whether the bus of a daemon was taken back.
     #[must_use]
     pub fn with_ownership(mut self, ownership: Option<OwnershipWatch>) -> Followed {
         self.ownership = ownership;
+        self
+    }
+
+    /// Whether there are lines about what cyclic frames show: working counters, and datagrams that were lost, unmatched
+    /// or skipped. There are by default.
+    #[must_use]
+    pub fn with_cyclic_lines(mut self, with_cyclic: bool) -> Followed {
+        self.with_cyclic = with_cyclic;
         self
     }
 
@@ -105,7 +115,7 @@ impl Drop for BusLog {
 }
 
 fn run(followed: &Followed, ends: &Receiver<()>, mut print: impl FnMut(Priority, &str)) {
-    let Followed { supervisor, ownership, lines } = followed;
+    let Followed { supervisor, ownership, lines, with_cyclic } = followed;
     let (mut looks, mut next_message) = (0_u32, 0);
     loop {
         let is_last = ends.recv_timeout(LOOK) != Err(RecvTimeoutError::Timeout);
@@ -115,7 +125,8 @@ fn run(followed: &Followed, ends: &Receiver<()>, mut print: impl FnMut(Priority,
             lines.own(ownership.now(), ownership.cause());
         }
         take_messages(supervisor, &mut lines, &mut next_message);
-        look(supervisor, &mut lines, is_last, looks.is_multiple_of(LOOKS_PER_SUMMARY) || is_last);
+        let is_second_over = *with_cyclic && (looks.is_multiple_of(LOOKS_PER_SUMMARY) || is_last);
+        look((supervisor, *with_cyclic), &mut lines, is_last, is_second_over);
         let all = lines.pop();
         drop(lines);
         for (priority, line) in all {
@@ -147,11 +158,13 @@ fn sample(supervisor: &SupervisorThread, live: &LiveStatus, is_last: bool) -> Op
     Some(Sample { is_up: seen.is_up.contains(&true), responding: seen.responding(), al_states: seen.al_states })
 }
 
-fn look(supervisor: &SupervisorThread, lines: &mut Lines, is_last: bool, is_second_over: bool) {
+fn look((supervisor, with_cyclic): (&SupervisorThread, bool), lines: &mut Lines, is_last: bool, is_second_over: bool) {
     let Ok(live) = supervisor.live_status() else { return };
     let seen = sample(supervisor, &live, is_last);
     while let Some(event) = supervisor.pop_event() {
-        lines.take(&event);
+        if with_cyclic || !lines::is_cyclic(&event.event) {
+            lines.take(&event);
+        }
     }
     if let Some(seen) = seen {
         lines.look(seen);

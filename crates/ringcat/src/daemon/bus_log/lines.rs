@@ -58,6 +58,11 @@ pub struct Lines {
 /// A line with its priority.
 pub(super) type Line = (Priority, String);
 
+/// Whether an event is what cyclic frames show.
+pub(super) const fn is_cyclic(event: &Event) -> bool {
+    matches!(event, Event::Domain { .. } | Event::Skipped { .. })
+}
+
 impl Lines {
     fn push(&mut self, priority: Priority, text: String) {
         self.lines.push((priority, text));
