@@ -37,6 +37,6 @@ pub use message::{
 pub use refusal::{Refusal, ServiceFault};
 pub use ringcat_link::process::wait_readable;
 pub use ringcat_link::visible::{is_hidden, visible};
-pub use settings::BusSettings;
+pub use settings::{BusSettings, DebugRing};
 pub use socket::DEFAULT_SOCKET;
 pub use wire::{Limits, VERSION, WireError};

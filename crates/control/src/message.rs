@@ -381,6 +381,16 @@ impl HandedBus {
 }
 
 impl HandedLinks {
+    /// Names of the links, the main one first: those of interfaces, otherwise what they are.
+    pub fn names(&self) -> Vec<String> {
+        let name = |link: &HandedLink, of_pipe: &str| match link {
+            HandedLink::Interface { name, .. } => name.clone(),
+            HandedLink::Pipe => of_pipe.to_owned(),
+        };
+        let redundant = self.redundant.as_ref().map(|link| name(link, "redundant"));
+        std::iter::once(name(&self.main, "main")).chain(redundant).collect()
+    }
+
     /// One link, or two.
     pub const fn new(main: HandedLink, redundant: Option<HandedLink>) -> HandedLinks {
         HandedLinks { main, redundant }

@@ -4,7 +4,13 @@
 //! defaults. Their names are those of variables, in the configuration of the daemon and in the environment of a program
 //! that opens links itself.
 
+mod debug_ring;
+mod value;
+
 use serde::{Deserialize, Serialize};
+
+pub use debug_ring::DebugRing;
+use value::yes_or_no;
 
 /// Settings of a master.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -18,56 +24,65 @@ pub struct BusSettings {
     pub assigns_sii: bool,
     /// Lines about what cyclic frames show are printed (`enable-rt-syslog`).
     pub prints_cyclic_lines: bool,
+    /// The last seconds before a fault are recorded (`enable-debug-ring`).
+    pub debug_ring: DebugRing,
 }
 
 impl Default for BusSettings {
     fn default() -> BusSettings {
-        BusSettings { has_wildcards: false, reads_alias_register: false, assigns_sii: false, prints_cyclic_lines: true }
+        BusSettings {
+            has_wildcards: false,
+            reads_alias_register: false,
+            assigns_sii: false,
+            prints_cyclic_lines: true,
+            debug_ring: DebugRing::default(),
+        }
     }
 }
 
-/// The effects of a variable: `yes`, `no`.
-struct Effects(&'static str, &'static str);
+/// Names of the variables that are `yes` or `no`, behind `RINGCAT_`.
+const SWITCHES: [&str; 4] = ["WILDCARDS", "REGALIAS", "SII_ASSIGN", "RT_SYSLOG"];
 
 impl BusSettings {
     /// Names of all variables, behind `RINGCAT_`.
-    pub const VARIABLES: [&'static str; 4] = ["WILDCARDS", "REGALIAS", "SII_ASSIGN", "RT_SYSLOG"];
+    pub fn variables() -> impl Iterator<Item = &'static str> {
+        SWITCHES.into_iter().chain(DebugRing::VARIABLES)
+    }
 
     /// Evaluates a variable by its name behind `RINGCAT_`. Returns its meaning.
     ///
     /// # Errors
-    /// There is no such variable, or its value is neither `yes` nor `no`; in one sentence.
-    pub fn set(&mut self, name: &str, value: &str) -> Result<&'static str, String> {
-        let (setting, effects) = match name {
+    /// There is no such variable, or it does not have such a value; in one sentence.
+    pub fn set(&mut self, name: &str, value: &str) -> Result<String, String> {
+        if let Some(rest) = name.strip_prefix("DEBUG_RING") {
+            return self.debug_ring.set(rest, value);
+        }
+        let (setting, [yes, no]) = match name {
             "WILDCARDS" => (
                 &mut self.has_wildcards,
-                Effects("vendor and product 0xFFFFFFFF stand for any", "vendor and product are compared as they are"),
+                ["vendor and product 0xFFFFFFFF stand for any", "vendor and product are compared as they are"],
             ),
             "REGALIAS" => (
                 &mut self.reads_alias_register,
-                Effects("aliases are those of register 0x0012", "aliases are those of the SII"),
+                ["aliases are those of register 0x0012", "aliases are those of the SII"],
             ),
             "SII_ASSIGN" => (
                 &mut self.assigns_sii,
-                Effects("the EEPROM belongs to the PDI on the way to PREOP", "the EEPROM stays with EtherCAT"),
+                ["the EEPROM belongs to the PDI on the way to PREOP", "the EEPROM stays with EtherCAT"],
             ),
             "RT_SYSLOG" => (
                 &mut self.prints_cyclic_lines,
-                Effects(
-                    "working counters and lost datagrams are printed",
-                    "working counters and lost datagrams are not printed",
-                ),
+                ["prints working counters and lost datagrams", "does not print working counters and lost datagrams"],
             ),
-            _ => return Err(format!("expected one of {}", Self::VARIABLES.join(", "))),
+            _ => return Err(expected()),
         };
-        let Effects(yes, no) = effects;
-        *setting = match value {
-            "yes" => true,
-            "no" => false,
-            _ => return Err(format!("expected yes or no, got {value:?}")),
-        };
-        Ok(if *setting { yes } else { no })
+        *setting = yes_or_no(value)?;
+        Ok(if *setting { yes } else { no }.to_owned())
     }
+}
+
+fn expected() -> String {
+    format!("expected one of {}", BusSettings::variables().collect::<Vec<_>>().join(", "))
 }
 
 #[cfg(test)]
@@ -78,11 +93,11 @@ mod tests {
     #[test]
     fn defaults_are_those_of_the_manual_and_each_variable_sets_one() {
         let values = |settings: &BusSettings| {
-            let BusSettings { has_wildcards, reads_alias_register, assigns_sii, prints_cyclic_lines } = *settings;
+            let BusSettings { has_wildcards, reads_alias_register, assigns_sii, prints_cyclic_lines, .. } = *settings;
             [has_wildcards, reads_alias_register, assigns_sii, prints_cyclic_lines]
         };
         assert_eq!(values(&BusSettings::default()), [false, false, false, true]);
-        for (at, name) in BusSettings::VARIABLES.into_iter().enumerate() {
+        for (at, name) in SWITCHES.into_iter().enumerate() {
             let mut settings = BusSettings::default();
             for (value, expected) in [("yes", true), ("no", false)] {
                 assert!(settings.set(name, value).is_ok());

@@ -10,9 +10,11 @@ use std::sync::{Arc, Mutex, Weak};
 use std::time::{Duration, Instant};
 
 use ringcat::daemon::{
-    BusLog, BusSettings, ClientError, DaemonError, Followed, OwnedBus, OwnershipWatch, Refusal, options_with,
+    BusLog, BusSettings, ClientError, DaemonError, Followed, FrameRecord, OwnedBus, OwnershipWatch, Refusal,
+    options_with,
 };
-use ringcat::{Options, Retries, SubDeviceInfo, SupervisorThread, realtime};
+use ringcat::tee::Tee;
+use ringcat::{Options, Retries, SubDeviceInfo, SupervisorThread, Taps, realtime};
 
 use crate::any_links::{self, AnyLinks};
 use crate::code::{Code, Outcome, report, report_as};
@@ -150,30 +152,46 @@ impl Bus {
         if !mistakes.is_empty() {
             return Err(mistakes.join("; "));
         }
-        let (cyclic, acyclic) = any_links::open(&source)?;
+        let names = any_links::names(&source);
+        let taps = settings.debug_ring.is_on.then(|| Taps::new(names.len()));
+        let (cyclic, acyclic) = any_links::open(&source, taps.as_ref())?;
         let started = SupervisorThread::start(acyclic, &options_with(&settings, &options), realtime::leave);
         let supervisor = started.map_err(|error| format!("{error}{}", memory_hint()))?;
-        Bus::with(master, supervisor, cyclic, Origin::Here(settings))
+        Bus::with(master, supervisor, cyclic, (Origin::Here(settings), taps, names))
     }
 
     fn of_daemon(socket: &Path, master: u32) -> Result<Bus, TakeError> {
         let _held = HeldSignals::hold();
         let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
-        let mut owned = OwnedBus::take(socket, master, &program_name(), &options, realtime::leave)?;
+        // Until the settings are known the acyclic half has a tap without a reader.
+        let taps = Taps::new(2);
+        let tap = any_links::tap(&taps);
+        let around = |_: &_, links| Ok(Tee::new(links, tap));
+        let taken = OwnedBus::take_with(socket, master, &program_name(), &options, realtime::leave, around);
+        let mut owned = taken?;
         let other = |text: String| TakeError::Other(Code::GONE, text);
         let links = owned.take_links().ok_or_else(|| other("the daemon has handed over no links".to_owned()))?;
-        let (supervisor, cyclic) = (owned.supervisor().clone(), AnyLinks::First(links));
-        Bus::with(master, supervisor, cyclic, Origin::Daemon(Box::new(owned))).map_err(other)
+        let taps = owned.settings().debug_ring.is_on.then_some(taps);
+        let (supervisor, names) = (owned.supervisor().clone(), owned.handed().names());
+        let cyclic = any_links::of_daemon(links, taps.as_ref().map(any_links::tap));
+        Bus::with(master, supervisor, cyclic, (Origin::Daemon(Box::new(owned)), taps, names)).map_err(other)
     }
 
-    fn with(master: u32, supervisor: SupervisorThread, cyclic: AnyLinks, origin: Origin) -> Result<Bus, String> {
+    fn with(
+        master: u32,
+        supervisor: SupervisorThread,
+        cyclic: AnyLinks,
+        (origin, taps, names): (Origin, Option<Taps>, Vec<String>),
+    ) -> Result<Bus, String> {
         let (settings, owned) = match origin {
             Origin::Here(settings) => (settings, None),
             Origin::Daemon(owned) => (owned.settings().clone(), Some(*owned)),
         };
         let ownership = owned.as_ref().map(|owned| owned.ownership().clone());
         let followed = Followed::new(supervisor.clone()).with_ownership(ownership.clone());
-        let followed = followed.with_cyclic_lines(settings.prints_cyclic_lines);
+        let record = taps.map(|taps| FrameRecord::start(&taps, master, names, settings.debug_ring.clone()));
+        let record = record.transpose().map_err(|error| error.to_string())?;
+        let followed = followed.with_cyclic_lines(settings.prints_cyclic_lines).with_record(record);
         let log = BusLog::start(followed, realtime::leave, move |priority, line| match master {
             0 => report_as(priority, format_args!("{line}")),
             _ => report_as(priority, format_args!("master {master}: {line}")),

@@ -25,7 +25,7 @@ pub fn socket(master: u32, variable: impl Fn(&str) -> Option<String>) -> Option<
 /// as missing.
 pub fn settings(variable: impl Fn(&str) -> Option<String>) -> (BusSettings, Vec<String>) {
     let (mut settings, mut mistakes) = (BusSettings::default(), Vec::new());
-    for name in BusSettings::VARIABLES {
+    for name in BusSettings::variables() {
         let value = variable(&format!("RINGCAT_{name}")).filter(|value| !value.is_empty());
         let set = value.map(|value| settings.set(name, &value));
         mistakes.extend(set.and_then(Result::err).map(|mistake| format!("RINGCAT_{name}: {mistake}")));

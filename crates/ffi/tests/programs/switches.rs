@@ -10,8 +10,8 @@ use crate::daemon::Bench;
 use crate::library::{here, program, workshop};
 
 /// Two SubDevices of one kind, the second one with an alias.
-fn segment() -> PathBuf {
-    let path = workshop().join("switches.toml");
+fn segment(test: &str) -> PathBuf {
+    let path = workshop().join(format!("switches-{test}.toml"));
     let text = "[[device]]\ntype = \"digital-output-8\"\n[[device]]\ntype = \"digital-output-8\"\nalias = 7\n";
     std::fs::write(&path, text).expect("it can be written");
     path
@@ -32,7 +32,7 @@ const MISSING: &str = "alias 7, not there\n";
 #[test]
 fn variables_of_a_program_with_links_of_its_own_are_switches() {
     let Some(switches) = program(&here().join("tests/c/switches.c"), &[]) else { return };
-    let segment = segment();
+    let segment = segment("own");
     let run = |variables: &[(&str, &str)], place| {
         let mut command = Command::new(&switches);
         said(command.env("RINGCAT_SIM", &segment).envs(variables.iter().copied()), place)
@@ -53,11 +53,11 @@ fn variables_of_a_program_with_links_of_its_own_are_switches() {
 fn a_program_has_the_settings_of_its_daemon() {
     let Some(switches) = program(&here().join("tests/c/switches.c"), &[]) else { return };
     let run = |bench: &Bench, switches: &Path, place| said(&mut bench.command(switches), place);
-    let mut settings = BusSettings::default();
-    let plain = Bench::start_with(&segment(), "switches", settings.clone());
+    let (segment, mut settings) = (segment("daemon"), BusSettings::default());
+    let plain = Bench::start_with(&segment, "switches", settings.clone());
     assert_eq!(run(&plain, &switches, ["7", "0", ANY, "own"]).as_deref(), Ok(MISSING));
     settings.has_wildcards = true;
-    let wild = Bench::start_with(&segment(), "wild", settings.clone());
+    let wild = Bench::start_with(&segment, "wild", settings);
     assert_eq!(run(&wild, &switches, ["7", "0", ANY, "own"]).as_deref(), Ok(FOUND));
     // The variables of the program do not count beside a daemon.
     let mut command = plain.command(&switches);

@@ -93,11 +93,10 @@ impl OwnedBus {
         let orders = Orders::new()?;
         let received = Received::take(&connection, master, &orders)?;
         let Received { bus: handed, cyclic, acyclic, lock, interfaces, knowledge } = received;
-        let in_threads = prepare.clone();
-        let main = acyclic.addresses().main;
+        let (in_threads, main) = (prepare.clone(), acyclic.addresses().main);
         let acyclic = around(&handed.links, acyclic)?;
-        let options = options_with(&handed.settings, options).with_idle_operation(true);
-        let is_known = knowledge.is_some();
+        let (options, is_known) = (options_with(&handed.settings, options), knowledge.is_some());
+        let options = options.with_idle_operation(true);
         let supervisor = match knowledge {
             Some(knowledge) => {
                 let known = (knowledge, Handover::Orderly);

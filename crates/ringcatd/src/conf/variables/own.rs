@@ -21,8 +21,8 @@ impl Reading {
         let own = &mut self.conf.own;
         let is_set = !value.is_empty();
         match name {
-            _ if BusSettings::VARIABLES.contains(&name) && !is_set => Ok("empty: the default".to_owned()),
-            _ if BusSettings::VARIABLES.contains(&name) => own.bus.set(name, value).map(str::to_owned),
+            _ if BusSettings::variables().any(|it| it == name) && !is_set => Ok("empty: the default".to_owned()),
+            _ if BusSettings::variables().any(|it| it == name) => own.bus.set(name, value),
             "SOCKET" | "MODE" | "GROUP" | "STOP_LIMIT" | "EOE" | "DEBUG_LEVEL" | "BACKUP" if !is_set => {
                 Ok("empty: the default".to_owned())
             }
@@ -63,7 +63,7 @@ impl Reading {
             _ => Err(format!(
                 "expected RINGCAT_SOCKET, _MODE, _GROUP, _STOP_LIMIT, _EOE, _DEBUG_LEVEL, _BACKUP, _{}, _MASTERx_SIM \
                  or _MASTERx_SAFE_STATE",
-                BusSettings::VARIABLES.join(", _")
+                BusSettings::variables().collect::<Vec<_>>().join(", _")
             )),
         }
     }

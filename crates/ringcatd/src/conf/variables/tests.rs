@@ -78,7 +78,8 @@ fn variables_of_ringcat_are_the_options_of_the_daemon() {
     assert_eq!(conf.understood.len(), 10);
     assert_eq!(meaning(&conf, "RINGCAT_REGALIAS"), "aliases are those of register 0x0012");
     let empty = "MASTER0_DEVICE=a\nRINGCAT_SOCKET=\nRINGCAT_MODE=\nRINGCAT_GROUP=\nRINGCAT_STOP_LIMIT=\nRINGCAT_EOE=\n\
-                 RINGCAT_DEBUG_LEVEL=\nRINGCAT_BACKUP=\nRINGCAT_WILDCARDS=\nRINGCAT_MASTER0_SIM=\nRINGCAT_MASTER7_SAFE_STATE=\n";
+                 RINGCAT_DEBUG_LEVEL=\nRINGCAT_BACKUP=\nRINGCAT_MASTER0_SIM=\nRINGCAT_MASTER7_SAFE_STATE=\n\
+                 RINGCAT_WILDCARDS=\nRINGCAT_DEBUG_RING_FILES=\n";
     assert_eq!(read(empty).own, Own::default());
 }
 
