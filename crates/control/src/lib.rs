@@ -3,6 +3,7 @@
 //! * [`message`]: their contents;
 //! * [`information`]: the present state of a segment;
 //! * [`tool`]: data of a master, its SubDevices and its application;
+//! * [`settings`]: what holds for whatever drives a master;
 //! * [`refusal`]: why a request is refused, in one sentence;
 //! * [`wire`]: messages as bytes, and any bytes as a message or an error;
 //! * [`connection`]: messages and descriptors over a Unix socket;
@@ -22,6 +23,7 @@ pub mod message;
 mod owner;
 mod receive_error;
 pub mod refusal;
+pub mod settings;
 pub mod socket;
 pub mod tool;
 pub mod wire;
@@ -35,5 +37,6 @@ pub use message::{
 pub use refusal::{Refusal, ServiceFault};
 pub use ringcat_link::process::wait_readable;
 pub use ringcat_link::visible::{is_hidden, visible};
+pub use settings::{BusSettings, DebugRing};
 pub use socket::DEFAULT_SOCKET;
 pub use wire::{Limits, VERSION, WireError};

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 pub use crate::information::SegmentOverview;
 pub use crate::owner::Owner;
 use crate::refusal::Refusal;
+use crate::settings::BusSettings;
 pub use crate::tool::{ToolAnswer, ToolQuery};
 
 /// Longest time for most answers.
@@ -331,6 +332,8 @@ pub struct HandedBus {
     pub can_switch: bool,
     /// Level of messages: 0 to 2, above as 2 ([`ToolQuery::SetDebugLevel`]). It outlasts hand-overs.
     pub debug_level: u32,
+    /// What holds for whatever drives the master.
+    pub settings: BusSettings,
 }
 
 /// The links of a master that is handed over. Descriptors follow in this order: cyclic half main, redundant; acyclic
@@ -371,12 +374,23 @@ impl MasterState {
 
 impl HandedBus {
     /// These links and nothing else.
-    pub const fn new(links: HandedLinks) -> HandedBus {
-        HandedBus { links, has_lock: false, interfaces: Vec::new(), can_switch: false, debug_level: 0 }
+    pub fn new(links: HandedLinks) -> HandedBus {
+        let settings = BusSettings::default();
+        HandedBus { links, has_lock: false, interfaces: Vec::new(), can_switch: false, debug_level: 0, settings }
     }
 }
 
 impl HandedLinks {
+    /// Names of the links, the main one first: those of interfaces, otherwise what they are.
+    pub fn names(&self) -> Vec<String> {
+        let name = |link: &HandedLink, of_pipe: &str| match link {
+            HandedLink::Interface { name, .. } => name.clone(),
+            HandedLink::Pipe => of_pipe.to_owned(),
+        };
+        let redundant = self.redundant.as_ref().map(|link| name(link, "redundant"));
+        std::iter::once(name(&self.main, "main")).chain(redundant).collect()
+    }
+
     /// One link, or two.
     pub const fn new(main: HandedLink, redundant: Option<HandedLink>) -> HandedLinks {
         HandedLinks { main, redundant }

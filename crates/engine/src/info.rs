@@ -7,6 +7,7 @@
 
 mod collect;
 mod dictionary;
+mod eeprom;
 mod extend;
 mod extent;
 mod identity_field;
@@ -23,6 +24,7 @@ use ringcat_wire::sii::{Category, SiiHeader};
 pub use crate::direction::Direction;
 pub(crate) use collect::is_possible;
 pub(crate) use dictionary::{KnownDictionary, MISSING_BYTES, bytes_of_entry, bytes_of_object, place};
+pub use eeprom::{AliasSource, SiiAssignment};
 pub use extent::SiiExtent;
 pub use identity_field::IdentityField;
 pub use object::{Entry, Object};

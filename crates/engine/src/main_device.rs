@@ -447,6 +447,8 @@ fn choices(options: &Options) -> Choices {
         retries: options.retries,
         pdos: options.pdos_in_preop(),
         dictionaries: options.dictionaries,
+        alias_source: options.alias_source,
+        sii_assignment: options.sii_assignment,
         // Without supervision unassigned SubDevices are not identified as members.
         follow_groups: options.follow_groups && options.supervision,
     }

@@ -2,34 +2,58 @@
 
 use std::path::Path;
 
-use ringcat::EitherLinks;
 use ringcat::daemon::DaemonLinks;
 use ringcat::packet::{PacketLinks, ReceiveMode};
 use ringcat::shared_segment::SharedSegment;
 use ringcat::sim::network::Network;
+use ringcat::tee::Tee;
+use ringcat::{EitherLinks, Tap, Taps};
 
 use crate::environment::Source;
 
-/// Links of one half: those of a daemon, network interfaces that this process opens, which are the same kind, or a
-/// simulated segment. Each cycle tests the kind several times, so each kind occurs once.
-pub type AnyLinks = EitherLinks<DaemonLinks, SharedSegment>;
+/// Links of one half with a tap: those of a daemon, network interfaces that this process opens, which are the same
+/// kind, or a simulated segment. Each cycle tests the kind several times, so each kind occurs once.
+pub type AnyLinks = Tee<EitherLinks<DaemonLinks, SharedSegment>>;
 
-/// Opens the links of the cyclic and of the acyclic half.
+/// Memory for frames on their way to a record: those of a tenth of a second.
+const QUEUE: usize = 4 << 20;
+
+/// The links of one half of a daemon's bus, and its tap; without one no frame is recorded.
+pub fn of_daemon(links: DaemonLinks, tap: Option<Tap>) -> AnyLinks {
+    Tee::new(EitherLinks::First(links), tap)
+}
+
+/// A tap for one half.
+pub fn tap(taps: &Taps) -> Tap {
+    taps.tap_with(QUEUE)
+}
+
+/// Names of links, the main one first.
+pub fn names(source: &Source) -> Vec<String> {
+    match source {
+        Source::Simulated(_) => vec!["main".to_owned(), "redundant".to_owned()],
+        Source::Interfaces(main, redundant) => std::iter::once(main).chain(redundant).cloned().collect(),
+    }
+}
+
+/// Opens the links of the cyclic and of the acyclic half, with taps where frames are recorded.
 ///
 /// # Errors
 /// What is wrong, for the operator.
-pub fn open(source: &Source) -> Result<(AnyLinks, AnyLinks), String> {
+pub fn open(source: &Source, taps: Option<&Taps>) -> Result<(AnyLinks, AnyLinks), String> {
+    let tee = |links| Tee::new(links, taps.map(tap));
     match source {
         Source::Simulated(file) => {
             let segment = ringcat::esi::load_segment(Path::new(file)).map_err(|error| error.to_string())?;
             let network = Network::from_description(segment).map_err(|error| error.to_string())?;
             let (cyclic, acyclic) = SharedSegment::halves(network);
-            Ok((AnyLinks::Second(cyclic), AnyLinks::Second(acyclic)))
+            Ok((tee(EitherLinks::Second(cyclic)), tee(EitherLinks::Second(acyclic))))
         }
         Source::Interfaces(main, redundant) => {
             let opened = PacketLinks::open_halves(main, redundant.as_deref(), ReceiveMode::Blocking);
             let (cyclic, acyclic) = opened.map_err(|error| error.to_string())?;
-            Ok((AnyLinks::First(DaemonLinks::First(cyclic)), AnyLinks::First(DaemonLinks::First(acyclic))))
+            let first = |links| tee(EitherLinks::First(DaemonLinks::First(links)));
+            Ok((first(cyclic), first(acyclic)))
         }
     }
 }

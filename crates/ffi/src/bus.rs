@@ -9,12 +9,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, Weak};
 use std::time::{Duration, Instant};
 
-use ringcat::daemon::{BusLog, ClientError, DaemonError, Followed, OwnedBus, OwnershipWatch, Refusal};
-use ringcat::{Options, Retries, SubDeviceInfo, SupervisorThread, realtime};
+use ringcat::daemon::{
+    BusLog, BusSettings, ClientError, DaemonError, Followed, FrameRecord, OwnedBus, OwnershipWatch, Refusal,
+    options_with,
+};
+use ringcat::tee::Tee;
+use ringcat::{Options, Retries, SubDeviceInfo, SupervisorThread, Taps, realtime};
 
 use crate::any_links::{self, AnyLinks};
 use crate::code::{Code, Outcome, report, report_as};
-use crate::environment::{program_name, source};
+use crate::environment::{program_name, settings, source};
 use crate::host::{HeldSignals, generation, memory_hint, variable};
 use crate::locks::{OfProcess, locked};
 use crate::responder::{DaemonResponder, Responder, code_of};
@@ -44,9 +48,18 @@ pub struct Bus {
     _owned: Mutex<Option<OwnedBus>>,
     /// Of a bus from a daemon.
     ownership: Option<OwnershipWatch>,
+    settings: BusSettings,
     responder: Arc<Responder>,
     is_reserved: AtomicBool,
     is_abandoned: AtomicBool,
+}
+
+/// Where a bus comes from.
+enum Origin {
+    /// This process has opened its links; the settings of variables.
+    Here(BusSettings),
+    /// A daemon.
+    Daemon(Box<OwnedBus>),
 }
 
 /// Why a daemon does not hand a bus over.
@@ -141,29 +154,50 @@ impl Bus {
                  segment file), got neither"
             )
         })?;
-        let (cyclic, acyclic) = any_links::open(&source)?;
-        let started = SupervisorThread::start(acyclic, &options, realtime::leave);
+        let (settings, mistakes) = settings(variable);
+        if !mistakes.is_empty() {
+            return Err(mistakes.join("; "));
+        }
+        let names = any_links::names(&source);
+        let taps = settings.debug_ring.is_on.then(|| Taps::new(names.len()));
+        let (cyclic, acyclic) = any_links::open(&source, taps.as_ref())?;
+        let started = SupervisorThread::start(acyclic, &options_with(&settings, &options), realtime::leave);
         let supervisor = started.map_err(|error| format!("{error}{}", memory_hint()))?;
-        Bus::with(master, supervisor, cyclic, None)
+        Bus::with(master, supervisor, cyclic, (Origin::Here(settings), taps, names))
     }
 
     fn of_daemon(socket: &Path, master: u32) -> Result<Bus, TakeError> {
         let _held = HeldSignals::hold();
         let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
-        let mut owned = OwnedBus::take(socket, master, &program_name(), &options, realtime::leave)?;
+        // Until the settings are known the acyclic half has a tap without a reader.
+        let taps = Taps::new(2);
+        let tap = any_links::tap(&taps);
+        let around = |_: &_, links| Ok(Tee::new(links, tap));
+        let taken = OwnedBus::take_with(socket, master, &program_name(), &options, realtime::leave, around);
+        let mut owned = taken?;
         let other = |text: String| TakeError::Other(Code::GONE, text);
         let links = owned.take_links().ok_or_else(|| other("the daemon has handed over no links".to_owned()))?;
-        Bus::with(master, owned.supervisor().clone(), AnyLinks::First(links), Some(owned)).map_err(other)
+        let taps = owned.settings().debug_ring.is_on.then_some(taps);
+        let (supervisor, names) = (owned.supervisor().clone(), owned.handed().names());
+        let cyclic = any_links::of_daemon(links, taps.as_ref().map(any_links::tap));
+        Bus::with(master, supervisor, cyclic, (Origin::Daemon(Box::new(owned)), taps, names)).map_err(other)
     }
 
     fn with(
         master: u32,
         supervisor: SupervisorThread,
         cyclic: AnyLinks,
-        owned: Option<OwnedBus>,
+        (origin, taps, names): (Origin, Option<Taps>, Vec<String>),
     ) -> Result<Bus, String> {
+        let (settings, owned) = match origin {
+            Origin::Here(settings) => (settings, None),
+            Origin::Daemon(owned) => (owned.settings().clone(), Some(*owned)),
+        };
         let ownership = owned.as_ref().map(|owned| owned.ownership().clone());
         let followed = Followed::new(supervisor.clone()).with_ownership(ownership.clone());
+        let record = taps.map(|taps| FrameRecord::start(&taps, master, names, settings.debug_ring.clone()));
+        let record = record.transpose().map_err(|error| error.to_string())?;
+        let followed = followed.with_cyclic_lines(settings.prints_cyclic_lines).with_record(record);
         let log = BusLog::start(followed, realtime::leave, move |priority, line| match master {
             0 => report_as(priority, format_args!("{line}")),
             _ => report_as(priority, format_args!("master {master}: {line}")),
@@ -171,17 +205,19 @@ impl Bus {
         let _log = log.map_err(|error| format!("a thread cannot be started: {error}{}", memory_hint()))?;
         let cyclic_links = Mutex::new(Some(cyclic));
         let generation = generation();
-        let responder = Arc::new(Responder::Here(supervisor.clone()));
+        let (responder, is_reserved) = (Arc::new(Responder::Here(supervisor.clone())), AtomicBool::new(false));
+        let _owned = Mutex::new(owned);
         Ok(Bus {
             master,
             generation,
             _log,
             supervisor,
             cyclic_links,
-            _owned: Mutex::new(owned),
+            _owned,
             ownership,
+            settings,
             responder,
-            is_reserved: AtomicBool::new(false),
+            is_reserved,
             is_abandoned: AtomicBool::new(false),
         })
     }
@@ -189,6 +225,11 @@ impl Bus {
     /// Number of the master.
     pub fn master(&self) -> u32 {
         self.master
+    }
+
+    /// Settings of the master.
+    pub fn settings(&self) -> &BusSettings {
+        &self.settings
     }
 
     /// The acyclic half.

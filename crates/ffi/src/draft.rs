@@ -27,6 +27,8 @@ pub struct Draft {
     /// Of a network file.
     names: Names,
     found: Vec<SubDeviceInfo>,
+    /// Vendor and product 0xFFFFFFFF stand for any.
+    has_wildcards: bool,
 }
 
 impl Draft {
@@ -46,6 +48,11 @@ impl Draft {
         &self.found
     }
 
+    /// Whether vendor and product 0xFFFFFFFF stand for any, in SubDevices that are declared from now on.
+    pub fn set_wildcards(&mut self, has_wildcards: bool) {
+        self.has_wildcards = has_wildcards;
+    }
+
     /// The index of a SubDevice with a name, if it was declared before.
     ///
     /// # Errors
@@ -60,7 +67,7 @@ impl Draft {
 
     /// Declares a SubDevice.
     pub fn add(&mut self, name: Name) -> usize {
-        let settings = Settings::new(name);
+        let settings = Settings::new(name).with_wildcards(self.has_wildcards);
         self.declaration.add_without_domain(settings.config(None));
         self.settings.push(settings);
         self.settings.len() - 1
@@ -95,8 +102,9 @@ impl Draft {
 
     /// Nothing is declared any more; what the scan has found and the program expects stays.
     pub fn clear(&mut self) {
-        let (found, send_interval) = (std::mem::take(&mut self.found), self.send_interval);
-        *self = Draft { found, send_interval, ..Draft::default() };
+        let (found, send_interval, has_wildcards) =
+            (std::mem::take(&mut self.found), self.send_interval, self.has_wildcards);
+        *self = Draft { found, send_interval, has_wildcards, ..Draft::default() };
     }
 
     /// The domains.

@@ -8,7 +8,7 @@
 
 use std::path::{Path, PathBuf};
 
-use ringcat::daemon::find_socket;
+use ringcat::daemon::{BusSettings, find_socket};
 
 /// The socket of a daemon that `RINGCAT_SOCKET` names, or one in the usual places if no variable names links. An empty
 /// variable counts as missing.
@@ -19,6 +19,18 @@ pub fn socket(master: u32, variable: impl Fn(&str) -> Option<String>) -> Option<
         (None, Some(_)) => None,
         (None, None) => Some(find_socket(|name| variable(name).map(Into::into))),
     }
+}
+
+/// Settings of a master whose links this process opens, and what is wrong with their variables. Empty variables count
+/// as missing.
+pub fn settings(variable: impl Fn(&str) -> Option<String>) -> (BusSettings, Vec<String>) {
+    let (mut settings, mut mistakes) = (BusSettings::default(), Vec::new());
+    for name in BusSettings::variables() {
+        let value = variable(&format!("RINGCAT_{name}")).filter(|value| !value.is_empty());
+        let set = value.map(|value| settings.set(name, &value));
+        mistakes.extend(set.and_then(Result::err).map(|mistake| format!("RINGCAT_{name}: {mistake}")));
+    }
+    (settings, mistakes)
 }
 
 /// The name with which a daemon names this process to others.
@@ -65,6 +77,18 @@ mod tests {
         let usual = find_socket(|_| None);
         assert_eq!(of(&set[1..], 1), Some(usual.clone()));
         assert_eq!(of(&[("RINGCAT_SOCKET", "")], 0), Some(usual));
+    }
+
+    // covers: c-interface
+    #[test]
+    fn settings_come_from_variables_and_mistakes_are_named() {
+        let set = [("RINGCAT_WILDCARDS", "yes"), ("RINGCAT_REGALIAS", ""), ("RINGCAT_SII_ASSIGN", "on")];
+        let (settings, mistakes) =
+            settings(|name| set.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned()));
+        let mut expected = BusSettings::default();
+        expected.has_wildcards = true;
+        assert_eq!(settings, expected);
+        assert_eq!(mistakes, ["RINGCAT_SII_ASSIGN: expected yes or no, got \"on\""]);
     }
 
     // covers: c-interface

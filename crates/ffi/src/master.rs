@@ -135,7 +135,10 @@ impl Master {
         let bus = self.take()?;
         bus.reserve()?;
         bus.wait_until_scanned();
-        locked(&self.draft).set_found(bus.found()?);
+        let mut draft = locked(&self.draft);
+        draft.set_found(bus.found()?);
+        draft.set_wildcards(bus.settings().has_wildcards);
+        drop(draft);
         self.is_reserved.store(true, Ordering::Release);
         Ok(())
     }

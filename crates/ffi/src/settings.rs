@@ -17,6 +17,8 @@ use crate::code::{Code, Outcome, report};
 pub const MAX_SYNC_MANAGERS: usize = 16;
 /// PDOs from here on are inputs.
 const FIRST_INPUT_PDO: u16 = 0x1A00;
+/// A vendor or a product that stands for any, where there are wildcards.
+const ANY: u32 = 0xFFFF_FFFF;
 /// Drives behind a SubDevice.
 const MAX_DRIVE: u8 = 7;
 
@@ -63,6 +65,8 @@ pub struct Settings {
     pub sync: Option<SyncSignals>,
     sii_to_pdi: bool,
     wait_before_safeop: Duration,
+    /// Vendor and product [`ANY`] stand for any.
+    has_wildcards: bool,
     /// All of them, from a network file.
     of_file: Option<Box<SubDeviceConfig>>,
 }
@@ -81,8 +85,16 @@ impl Settings {
             sync: None,
             sii_to_pdi: false,
             wait_before_safeop: Duration::ZERO,
+            has_wildcards: false,
             of_file: None,
         }
+    }
+
+    /// Whether vendor and product 0xFFFFFFFF stand for any.
+    #[must_use]
+    pub fn with_wildcards(mut self, has_wildcards: bool) -> Settings {
+        self.has_wildcards = has_wildcards;
+        self
     }
 
     /// Those of a network file.
@@ -261,7 +273,9 @@ impl Settings {
         let Name { alias, position, vendor, product } = self.name;
         // Alias 0 is the exact position.
         let address = ConfigAddress::Alias { alias, offset: position };
-        let mut config = SubDeviceConfig::at(address).expect_product(vendor, product).refused_pdos(RefusedPdos::Warn);
+        let mut config = SubDeviceConfig::at(address).refused_pdos(RefusedPdos::Warn);
+        let expected = |value: u32| Some(value).filter(|value| !(self.has_wildcards && *value == ANY));
+        (config.expected.vendor_id, config.expected.product_code) = (expected(vendor), expected(product));
         for (number, sync_manager) in (0u8..).zip(&self.sync_managers) {
             config = sync_manager.declare(number, config, info);
         }

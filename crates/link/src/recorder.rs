@@ -5,6 +5,7 @@
 //! statistics count it (`isb_ifdrop`).
 
 mod frame_queue;
+mod frame_ring;
 mod taps;
 
 use std::error::Error;
@@ -20,6 +21,7 @@ use std::time::Duration;
 use crate::pcapng::{Direction, Statistics, Writer};
 use crate::realtime;
 pub use frame_queue::FrameNote;
+pub use frame_ring::FrameRing;
 use taps::unix_now_ns;
 pub use taps::{AlreadyRead, FrameReader, Tap, Taps};
 

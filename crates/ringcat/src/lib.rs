@@ -184,7 +184,7 @@ pub use ringcat_engine::event::{
 };
 pub use ringcat_engine::exchange::{ClockDatagrams, ReferenceTime};
 pub use ringcat_engine::exchange::{CopyError, CopyId, CopyRule, CyclicCounters, Entry, WhenStale};
-pub use ringcat_engine::info::{DataWord, Direction, SiiExtent, SubDeviceInfo};
+pub use ringcat_engine::info::{AliasSource, DataWord, Direction, SiiAssignment, SiiExtent, SubDeviceInfo};
 pub use ringcat_engine::knowledge::{Handover, Knowledge, KnowledgeError, KnownMailbox, KnownProgress, KnownSubDevice};
 pub use ringcat_engine::layout::LrwPolicy;
 pub use ringcat_engine::link::Link;

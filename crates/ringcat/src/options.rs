@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat_engine::info::SiiExtent;
+use ringcat_engine::info::{AliasSource, SiiAssignment, SiiExtent};
 #[cfg(feature = "standby")]
 use ringcat_engine::main_device::StandbyOptions;
 use ringcat_engine::main_device::{MainDevice as Engine, Options as Engineering, Retries};
@@ -33,6 +33,10 @@ pub struct Options {
     /// read in the background afterwards, or by [`Services::complete_siis`](crate::Services::complete_siis) when it is
     /// needed.
     pub sii_extent: Option<SiiExtent>,
+    /// Where the aliases of SubDevices are read.
+    pub alias_source: AliasSource,
+    /// When the EEPROMs of SubDevices belong to their PDIs.
+    pub sii_assignment: SiiAssignment,
     /// Dictionaries read for PDOs. `None`: [`ReadPdos::Missing`], in PREOP with idle operation [`ReadPdos::Always`].
     pub pdos: Option<ReadPdos>,
     /// Whether object dictionaries are read in the background while no application is active, with idle operation:
@@ -81,6 +85,8 @@ impl Default for Options {
         Options {
             sii_cache: true,
             sii_extent: None,
+            alias_source: AliasSource::default(),
+            sii_assignment: SiiAssignment::default(),
             pdos: None,
             dictionaries: false,
             supervision: true,
@@ -112,6 +118,20 @@ impl Options {
     #[must_use]
     pub fn with_sii_extent(mut self, sii_extent: SiiExtent) -> Options {
         self.sii_extent = Some(sii_extent);
+        self
+    }
+
+    /// Sets [`Options::alias_source`].
+    #[must_use]
+    pub fn with_alias_source(mut self, alias_source: AliasSource) -> Options {
+        self.alias_source = alias_source;
+        self
+    }
+
+    /// Sets [`Options::sii_assignment`].
+    #[must_use]
+    pub fn with_sii_assignment(mut self, sii_assignment: SiiAssignment) -> Options {
+        self.sii_assignment = sii_assignment;
         self
     }
 
@@ -220,6 +240,8 @@ impl Options {
         let mut options = Engineering::new(main, redundant);
         options.sii_cache = self.sii_cache;
         options.sii_extent = self.sii_extent;
+        options.alias_source = self.alias_source;
+        options.sii_assignment = self.sii_assignment;
         options.pdos = self.pdos;
         options.dictionaries = self.dictionaries;
         options.supervision = self.supervision;

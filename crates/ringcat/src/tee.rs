@@ -11,6 +11,8 @@ use std::task::Waker;
 use ringcat_engine::link::Link;
 use ringcat_engine::time::Instant;
 use ringcat_link::Tap;
+#[cfg(feature = "eoe")]
+use ringcat_link::WakeUp;
 use ringcat_link::pcapng::Direction;
 use ringcat_wire::frame::MacAddress;
 
@@ -44,7 +46,33 @@ impl<L: Links> Tee<L> {
     }
 }
 
+impl<L: Links> Tee<L> {
+    /// Whether frames are recorded.
+    #[inline(always)]
+    fn is_read(&self) -> bool {
+        self.tap.as_ref().is_some_and(Tap::is_read)
+    }
+
+    #[cold]
+    fn record_sent(&mut self, link: Link, frame: &[u8]) {
+        if let Some(tap) = &mut self.tap {
+            tap.record(link.index(), Direction::Out, self.links.now().0, frame);
+        }
+    }
+
+    #[cold]
+    fn receive_recorded(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool {
+        let Some(tap) = &mut self.tap else { return false };
+        let now = self.links.now().0;
+        self.links.receive(&mut |link, frame| {
+            tap.record(link.index(), Direction::In, now, frame);
+            take(link, frame);
+        })
+    }
+}
+
 impl<L: Links> Links for Tee<L> {
+    #[inline(always)]
     fn now(&self) -> Instant {
         self.links.now()
     }
@@ -53,26 +81,34 @@ impl<L: Links> Links for Tee<L> {
         self.links.addresses()
     }
 
+    #[inline(always)]
     fn send(&mut self, link: Link, frame: &[u8]) {
-        if let Some(tap) = &mut self.tap {
-            tap.record(link.index(), Direction::Out, self.links.now().0, frame);
+        if self.is_read() {
+            self.record_sent(link, frame);
         }
         self.links.send(link, frame);
     }
 
+    #[inline(always)]
     fn receive(&mut self, take: &mut dyn FnMut(Link, &[u8])) -> bool {
-        let Some(tap) = &mut self.tap else { return self.links.receive(take) };
-        let now = self.links.now().0;
-        self.links.receive(&mut |link, frame| {
-            tap.record(link.index(), Direction::In, now, frame);
-            take(link, frame);
-        })
+        if self.is_read() { self.receive_recorded(take) } else { self.links.receive(take) }
     }
 
+    #[inline(always)]
+    fn has_frame(&self) -> bool {
+        self.links.has_frame()
+    }
+
+    fn has_arrival_times(&self) -> bool {
+        self.links.has_arrival_times()
+    }
+
+    #[inline(always)]
     fn received_at(&mut self, sent_at: Instant, now: Instant) -> Option<Instant> {
         self.links.received_at(sent_at, now)
     }
 
+    #[inline(always)]
     fn carrier(&self, link: Link) -> Option<bool> {
         self.links.carrier(link)
     }
@@ -81,10 +117,21 @@ impl<L: Links> Links for Tee<L> {
         self.links.waker()
     }
 
+    #[cfg(feature = "eoe")]
+    fn wake_up(&self) -> Option<WakeUp> {
+        self.links.wake_up()
+    }
+
+    #[inline(always)]
+    fn take_call(&mut self) -> bool {
+        self.links.take_call()
+    }
+
     fn wait(&mut self, until: Instant) {
         self.links.wait(until);
     }
 
+    #[inline(always)]
     fn wait_from(&mut self, now: Instant, until: Instant) {
         self.links.wait_from(now, until);
     }

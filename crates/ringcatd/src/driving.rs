@@ -3,12 +3,15 @@
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use ringcat::daemon::{BusLog, Followed, Lines, adopt_links, serving};
+use ringcat::daemon::{
+    BusLog, BusSettings, Followed, FrameRecord, Lines, RecordReason, adopt_links, options_with, serving,
+};
 use ringcat::eoe::{Ethernet, EthernetEvent, EthernetOptions};
 use ringcat::foreign::{ListeningPhase, ListeningState, QuietLinks};
+use ringcat::tee::Tee;
 use ringcat::{
     Activity, AlState, Error, Handover, Knowledge, Links, LogFilter, LogLevel, Options, Retries, Services, Snapshot,
-    StateScope, SupervisorThread,
+    StateScope, SupervisorThread, Taps,
 };
 
 use crate::ethernet::EthernetInterfaces;
@@ -25,6 +28,8 @@ const SETTLE: Duration = Duration::from_secs(3);
 const STILL: Duration = Duration::from_millis(100);
 /// SubDevices reach their safe state within this time.
 const LEAD: Duration = Duration::from_secs(10);
+/// Memory for frames on their way to the record: those of a tenth of a second.
+const QUEUE: usize = 4 << 20;
 /// Interval at which the progress of a scan is read.
 const LOOK: Duration = Duration::from_millis(1);
 
@@ -39,6 +44,8 @@ pub struct Lasting<'a> {
     pub lines: Arc<Mutex<Lines>>,
     /// Level of messages.
     pub debug_level: u32,
+    /// What holds for whatever drives the master.
+    pub settings: &'a BusSettings,
     /// Network interfaces of EoE; `None`: there are none.
     pub interfaces: Option<Arc<EthernetInterfaces>>,
     /// Frames received on the links: nothing is sent before.
@@ -65,8 +72,9 @@ impl Driving {
         let (cyclic, acyclic) = adopted.map_err(|error| error.to_string())?;
         let main_address = acyclic.addresses().main.0;
         let acyclic = QuietLinks::new(acyclic, cyclic, lasting.listened.clone(), opened.clone());
+        let (acyclic, record) = recorded(acyclic, opened, lasting, handover)?;
         let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
-        let options = options.with_dictionaries(true);
+        let options = options_with(lasting.settings, &options).with_dictionaries(true);
         let supervisor = match Knowledge::from_bytes(lasting.knowledge) {
             Ok(knowledge) => SupervisorThread::start_resumed(acyclic, &options, (knowledge, handover), || ()),
             // Nothing is known yet.
@@ -76,6 +84,7 @@ impl Driving {
         let level = LogFilter::new(LogLevel::from_number(lasting.debug_level));
         supervisor.set_log_filter(level).map_err(|error| error.to_string())?;
         let followed = Followed::new(supervisor.clone()).with_lines(lasting.lines.clone());
+        let followed = followed.with_cyclic_lines(lasting.settings.prints_cyclic_lines).with_record(record);
         let number = lasting.number;
         let log = BusLog::start(
             followed,
@@ -138,6 +147,28 @@ impl Driving {
             say(format_args!("master {number}: all SubDevices stay in PREOP: {error}"));
         }
     }
+}
+
+/// Links whose frames are recorded for a file at a fault, where that is wanted. The end of an application without a
+/// release is a fault that has just been.
+fn recorded<L: Links>(
+    links: L,
+    opened: &Opened,
+    lasting: &Lasting<'_>,
+    handover: Handover,
+) -> Result<(Tee<L>, Option<FrameRecord>), String> {
+    let ring = &lasting.settings.debug_ring;
+    if !ring.is_on {
+        return Ok((Tee::new(links, None), None));
+    }
+    let names = opened.links().names();
+    let taps = Taps::new(names.len());
+    let record = FrameRecord::start(&taps, lasting.number, names, ring.clone());
+    let mut record = record.map_err(|error| error.to_string())?;
+    if handover == Handover::AfterCrash && !lasting.knowledge.is_empty() {
+        record.note(RecordReason::OwnerLost, Instant::now());
+    }
+    Ok((Tee::new(links, taps.tap_with(QUEUE)), Some(record)))
 }
 
 /// Waits until no SubDevice changes its state any more, and until the PDOs of dictionaries are read that are about to

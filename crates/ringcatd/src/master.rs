@@ -11,7 +11,7 @@ use std::time::Duration;
 use ringcat::daemon::{Lines, serving};
 use ringcat::{AlState, Handover, Knowledge};
 use ringcat_control::message::{Answer, HandedBus, MasterState, Query, ToolAnswer, ToolQuery};
-use ringcat_control::{Content, Message, Refusal};
+use ringcat_control::{BusSettings, Content, Message, Refusal};
 use ringcat_link::TapInterface;
 
 use crate::driver::{CHANGE, Current, Driver};
@@ -44,12 +44,15 @@ pub struct Settings {
     pub interfaces: Option<EthernetInterfaces>,
     /// Level of messages at the beginning.
     pub debug_level: u32,
+    /// What holds for whatever drives it.
+    pub bus: BusSettings,
 }
 
 impl Settings {
     /// PREOP, without a lock, network interfaces and messages.
     pub fn new(number: u32, links: String) -> Settings {
-        Settings { number, links, safe_state: AlState::PreOp, lock: None, interfaces: None, debug_level: 0 }
+        let (safe_state, bus) = (AlState::PreOp, BusSettings::default());
+        Settings { number, links, safe_state, lock: None, interfaces: None, debug_level: 0, bus }
     }
 }
 
@@ -70,6 +73,8 @@ pub struct Master {
     lines: Arc<Mutex<Lines>>,
     /// Level of messages, whatever drives the master.
     debug_level: AtomicU32,
+    /// What holds for whatever drives it.
+    bus: BusSettings,
     others: Others,
 }
 
@@ -123,7 +128,7 @@ impl Master {
 
     /// The same with settings. Links that cannot be opened are tried again by [`Master::supervise`].
     pub fn start(settings: Settings, wires: Wires) -> Master {
-        let Settings { number, links, safe_state, lock, interfaces, debug_level } = settings;
+        let Settings { number, links, safe_state, lock, interfaces, debug_level, bus } = settings;
         let is_shared = wires.are_shared();
         let master = Master {
             number,
@@ -136,6 +141,7 @@ impl Master {
             knowledge: Mutex::default(),
             lines: Arc::default(),
             debug_level: AtomicU32::new(debug_level),
+            bus,
             others: Others::new(number, is_shared),
         };
         master.drive(Handover::Orderly);
@@ -265,6 +271,7 @@ impl Master {
         handed.has_lock = lock.is_some();
         handed.interfaces = interfaces.iter().map(|(name, _)| name.clone()).collect();
         handed.can_switch = opened.can_switch();
+        handed.settings = self.bus.clone();
         handed.debug_level = self.debug_level.load(Ordering::Acquire);
         let mut raw: Vec<_> = opened.descriptors().iter().map(AsRawFd::as_raw_fd).collect();
         raw.extend(lock.iter().map(OwnerLock::descriptor));
@@ -415,7 +422,8 @@ impl Master {
         let (lines, debug_level) = (self.lines.clone(), self.debug_level.load(Ordering::Acquire));
         let interfaces = self.interfaces.clone();
         let listened = self.others.listened();
-        let lasting = Lasting { number: self.number, knowledge: &knowledge, lines, debug_level, interfaces, listened };
+        let (number, settings) = (self.number, &self.bus);
+        let lasting = Lasting { number, knowledge: &knowledge, lines, debug_level, settings, interfaces, listened };
         let driving = Driving::start(&opened, &lasting, handover)?;
         for absent in opened.absent() {
             say(format_args!("master {}: interface {absent} is not there; the ring goes on without it", self.number));

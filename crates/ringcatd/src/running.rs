@@ -114,6 +114,7 @@ fn master(
     settings.lock = Some(lock);
     settings.interfaces = setup.has_eoe.then(|| EthernetInterfaces::new(option.master));
     settings.debug_level = setup.debug_level;
+    settings.bus = setup.bus.clone();
     if let Some(safe) = setup.safe_states.iter().find(|it| it.master == option.master) {
         settings.safe_state = safe.state;
     }

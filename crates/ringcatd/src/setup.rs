@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use ringcat_control::BusSettings;
 
 use crate::conf::Conf;
 use crate::device::{Device, Found};
@@ -77,6 +78,8 @@ pub struct Setup {
     pub up_down: Vec<String>,
     /// Level of messages at the beginning.
     pub debug_level: u32,
+    /// What holds for whatever drives a master.
+    pub bus: BusSettings,
     /// A master waits until its backup interface is there.
     pub needs_backup: bool,
     /// It ends with the standard input.
@@ -108,6 +111,7 @@ impl Setup {
             has_eoe: !options.no_eoe && own.eoe.unwrap_or(true),
             up_down,
             debug_level: own.debug_level.unwrap_or(0),
+            bus: own.bus,
             needs_backup: options.needs_backup || own.needs_backup,
             ends_with_input: options.while_input_is_open,
         })

@@ -13,6 +13,7 @@ use ringcat_wire::sii::{
     Strings, SyncManagerKind,
 };
 
+use super::eeprom::AliasSource;
 use super::subdevice::{PdoEntryInfo, PdoInfo, Readout, SubDeviceInfo};
 use super::warning::{InfoWarning, SiiProblem};
 use crate::direction::Direction;
@@ -32,7 +33,6 @@ pub(super) fn collect(readout: Readout, header: &SiiHeader, parts: &[Category<'_
     let mut info = SubDeviceInfo {
         position: readout.position,
         station: readout.station,
-        alias: readout.alias,
         identity: header.identity,
         controller: readout.information.into(),
         device_emulation: EscConfiguration::from_bits(esc_configuration).device_emulation,
@@ -40,11 +40,17 @@ pub(super) fn collect(readout: Readout, header: &SiiHeader, parts: &[Category<'_
         receive_times: readout.receive_times,
         ..SubDeviceInfo::default()
     };
+    if readout.alias_source == AliasSource::Register {
+        info.alias = readout.alias;
+    }
     // The reserved words behind them are not read.
     let bytes = &header.encode()[..READ_BYTES];
     if [0x00, 0xFF].iter().any(|erased| bytes.iter().all(|byte| byte == erased)) {
         info.warnings.push(InfoWarning { category: None, offset: None, problem: SiiProblem::Blank });
         return info;
+    }
+    if readout.alias_source == AliasSource::Sii {
+        info.alias = header.alias;
     }
     info.warnings.extend(parts.erased());
     collect_header(&mut info, header);

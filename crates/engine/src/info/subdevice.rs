@@ -11,6 +11,7 @@ use ringcat_wire::sii::{
     SyncManagerKind,
 };
 
+use super::eeprom::AliasSource;
 use super::extent::SiiExtent;
 use super::pdo_source::PdoSource;
 use super::warning::{InfoWarning, SiiProblem};
@@ -102,6 +103,8 @@ pub struct Readout {
     pub station: StationAddress,
     /// Register STATION_ALIAS (0x0012); 0 is none.
     pub alias: u16,
+    /// Whether this or the SII has the alias.
+    pub alias_source: AliasSource,
     /// Registers 0x0000..0x0009.
     pub information: Information,
     /// Register DL_STATUS.
@@ -120,7 +123,7 @@ pub struct SubDeviceInfo {
     pub station: StationAddress,
     /// How much of its SII is known: names are empty and there are no operation modes until they are.
     pub extent: SiiExtent,
-    /// Alias; 0 is none.
+    /// Alias, of the SII or of register STATION_ALIAS ([`AliasSource`]); 0 is none.
     pub alias: u16,
     /// Vendor, product, revision, serial number.
     pub identity: Identity,
@@ -241,7 +244,11 @@ impl SubDeviceInfo {
 
     /// The same SubDevice with other ports, at another position; shared if nothing differs.
     pub(crate) fn seen_at(self: &Rc<SubDeviceInfo>, readout: &Readout) -> Rc<SubDeviceInfo> {
-        let Readout { position, dl_status, receive_times, alias, .. } = *readout;
+        let Readout { position, dl_status, receive_times, .. } = *readout;
+        let alias = match readout.alias_source {
+            AliasSource::Sii => self.alias,
+            AliasSource::Register => readout.alias,
+        };
         let is_same = (position, dl_status, alias) == (self.position, self.dl_status, self.alias);
         if is_same {
             return self.clone();

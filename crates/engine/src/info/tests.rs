@@ -23,6 +23,7 @@ fn readout() -> Readout {
         position: Position(3),
         station: StationAddress(0x1003),
         alias: 9,
+        alias_source: AliasSource::Register,
         information: Information::decode(&INFORMATION),
         dl_status: DlStatus::from_bits(0x5A33),
         receive_times: Some([1, 2, 3, 4]),

@@ -5,7 +5,7 @@ use core::time::Duration;
 use ringcat_wire::frame::MacAddress;
 use ringcat_wire::source_address::MacCodec;
 
-use crate::info::SiiExtent;
+use crate::info::{AliasSource, SiiAssignment, SiiExtent};
 use crate::junction::JunctionMode;
 use crate::link::LinkSet;
 use crate::ring::MIN_DATAGRAMS_PER_FRAME;
@@ -30,6 +30,10 @@ pub struct Options {
     /// How much of each SII a scan reads; the rest follows in the background once all are in their target states.
     /// `None`: all of it, and in [`MainDevice::start_scan_for_operation`](super::MainDevice) what operation needs.
     pub sii_extent: Option<SiiExtent>,
+    /// Where the aliases of SubDevices are read.
+    pub alias_source: AliasSource,
+    /// When the EEPROMs of SubDevices belong to their PDIs.
+    pub sii_assignment: SiiAssignment,
     /// Dictionaries that are read for PDOs: after a scan, which brings the SubDevice to PREOP and back for this, and of
     /// undeclared SubDevices in PREOP. `None`: after a scan [`ReadPdos::Missing`], in PREOP [`ReadPdos::Always`] with
     /// idle operation and [`ReadPdos::Missing`] without.
@@ -75,6 +79,8 @@ impl Options {
             codec: MacCodec::FlagsFirst,
             sii_cache: true,
             sii_extent: None,
+            alias_source: AliasSource::default(),
+            sii_assignment: SiiAssignment::default(),
             pdos: None,
             dictionaries: false,
             supervision: true,

@@ -72,6 +72,8 @@ impl MainDevice {
             junctions: self.options.junctions,
             pdos: self.options.pdos.unwrap_or_default(),
             enhanced_line_crossed: self.options.enhanced_line_crossed,
+            alias_source: self.options.alias_source,
+            sii_assignment: self.options.sii_assignment,
         }
     }
 

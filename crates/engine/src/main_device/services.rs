@@ -17,7 +17,7 @@ use core::time::Duration;
 use ringcat_wire::address::{RegisterAddress, StationAddress};
 use ringcat_wire::memory_write::WriteKind;
 use ringcat_wire::register::LoopControl;
-use ringcat_wire::sii::Identity;
+use ringcat_wire::sii::{Identity, SiiHeader};
 
 use super::MainDevice;
 use super::pending::Pending;
@@ -35,7 +35,7 @@ use crate::procedures::sii::images::{self, SiiImages};
 use crate::procedures::sii::program::{self, SiiWritten};
 use crate::procedures::unassigned::rescan::{Rescan, rescan};
 use crate::role::Function;
-use crate::segment::{Addressed, Observation};
+use crate::segment::{Addressed, More, Observation};
 use crate::supervisor::Bus;
 use crate::supervisor::long_transfers::TransferProgress;
 
@@ -267,34 +267,44 @@ impl MainDevice {
         image: Vec<u8>,
         force: bool,
     ) -> Pending<Result<SiiWritten, ServiceError>> {
-        let (cache, images, eeproms) = (self.cache.clone(), self.sii_images.clone(), self.segment.eeproms.clone());
+        let (cache, images, segment) = (self.cache.clone(), self.sii_images.clone(), self.segment.clone());
         let subdevice: Address = subdevice.into();
         self.start_on(Function::Eeprom, subdevice, move |bus, station| async move {
-            let _turn = eeproms.take(station).await;
+            let _turn = segment.eeproms.take(station).await;
             let _write = bus.begin_memory_write(subdevice.memory_write(WriteKind::Eeprom));
             images.forget(station);
+            let key = segment.key_for_alias(station);
             let written = program::write(&bus, station, &image, force).await;
             cache.clear();
+            if let (Ok(_), Some(key), Some(header)) = (&written, key, image.first_chunk()) {
+                let alias = SiiHeader::decode(header).alias;
+                segment.observe(Observation::MoreRead { key, more: More::Alias(alias) });
+            }
             written
         })
     }
 
     /// Starts a write of the alias into the EEPROM, with the new checksum. A checksum that is wrong before is corrected
-    /// only with `force`. The alias is valid from the next start of the SubDevice on.
+    /// only with `force`. As an alias of the SII it counts at once, as one of the register from the next start of the
+    /// SubDevice on ([`AliasSource`](crate::info::AliasSource)).
     pub fn start_alias_write(
         &mut self,
         subdevice: impl Into<Address>,
         alias: u16,
         force: bool,
     ) -> Pending<Result<SiiWritten, ServiceError>> {
-        let (cache, images, eeproms) = (self.cache.clone(), self.sii_images.clone(), self.segment.eeproms.clone());
+        let (cache, images, segment) = (self.cache.clone(), self.sii_images.clone(), self.segment.clone());
         let subdevice: Address = subdevice.into();
         self.start_on(Function::Eeprom, subdevice, move |bus, station| async move {
-            let _turn = eeproms.take(station).await;
+            let _turn = segment.eeproms.take(station).await;
             let _write = bus.begin_memory_write(subdevice.memory_write(WriteKind::Eeprom));
             images.forget(station);
+            let key = segment.key_for_alias(station);
             let written = program::write_alias(&bus, station, alias, force).await;
             cache.clear();
+            if let (Ok(_), Some(key)) = (&written, key) {
+                segment.observe(Observation::MoreRead { key, more: More::Alias(alias) });
+            }
             written
         })
     }

@@ -117,7 +117,8 @@ async fn read_one(
         (true, OfPdi::Read) => sii::claim(bus, station).await?,
         (false, OfPdi::Read | OfPdi::Leave) => {}
     }
-    let read = read_whole(bus, (position, station), &segment.cache).await;
+    let alias_source = segment.view().alias_source();
+    let read = read_whole(bus, (position, station), &segment.cache, alias_source).await;
     if before.offer_pdi {
         sii::assign(bus, station, true).await?;
     }

@@ -128,14 +128,15 @@ impl BringUp<'_> {
         self.bus.fpwr(self.station, map::sync_manager(index), &register.encode()).await
     }
 
-    /// Commands of IP, mailbox, EEPROM to the PDI during the transition, PREOP, other commands of IP.
+    /// Commands of IP, mailbox, EEPROM to the PDI during the transition if it is lent, PREOP, other commands of IP.
     async fn preop(&self) -> Result<(), ConfigureError> {
         self.command_registers(Transition::Ip).await?;
         for sync_manager in &self.setup.plan.mailbox {
             self.write_sync_manager(sync_manager.index, &sync_manager.register).await?;
         }
         let has_application = !self.setup.plan.mailbox.is_empty();
-        if has_application || self.config.sii_to_pdi {
+        let is_lent = has_application && self.segment.view().sii_assignment().lends_towards_preop();
+        if is_lent || self.config.sii_to_pdi {
             sii::assign(self.bus, self.station, true).await?;
         }
         self.request(AlState::Init, AlState::PreOp).await?;
@@ -143,7 +144,7 @@ impl BringUp<'_> {
             self.show_mail(send.index).await?;
             self.mailbox.open(self.station, layout, send.index);
         }
-        if has_application && !self.config.sii_to_pdi {
+        if is_lent && !self.config.sii_to_pdi {
             sii::assign(self.bus, self.station, false).await?;
         }
         self.command_mail(Transition::Ip).await

@@ -12,7 +12,7 @@ use super::scan::Scan;
 use super::visit::visit;
 use crate::config::PdoAssignment;
 use crate::event::Notice;
-use crate::info::SubDeviceInfo;
+use crate::info::{SiiAssignment, SubDeviceInfo};
 use crate::mail::coe::{SdoError, SdoFailure, pdo};
 use crate::mail::{Limits, Mailbox, MailboxError};
 use crate::segment::ReadPdos;
@@ -79,16 +79,16 @@ pub(super) fn report_unreadable(bus: &Bus, info: &SubDeviceInfo, reason: &str) {
 }
 
 /// Reads dictionaries after a scan, and updates it. Each SubDevice is brought to PREOP, and back to INIT.
-pub(super) async fn complete(bus: &Bus, scan: &mut Scan, which: ReadPdos) {
+pub(super) async fn complete(bus: &Bus, scan: &mut Scan, (which, assignment): (ReadPdos, SiiAssignment)) {
     let wanted = scan.subdevices.iter().filter(|info| is_wanted(info, which)).cloned();
     let read = bus.gather(wanted.collect::<Vec<_>>(), |bus, info| async move {
         let mailbox = Mailbox::new(&bus, info.position);
-        let result = match visit(&bus, &info, &mailbox, AlState::PreOp).await {
+        let result = match visit(&bus, &info, &mailbox, AlState::PreOp, assignment).await {
             Ok(()) => read(&bus, &info, &mailbox).await,
             Err(error) => Dictionary::Unreadable(error.to_string()),
         };
         // A SubDevice that refuses is handled when it is configured.
-        let _ = visit(&bus, &info, &mailbox, AlState::Init).await;
+        let _ = visit(&bus, &info, &mailbox, AlState::Init, assignment).await;
         (info.position, result)
     });
     for (position, result) in read.await {

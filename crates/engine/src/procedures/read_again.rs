@@ -12,11 +12,12 @@ use crate::supervisor::Bus;
 /// Reads the SII. If it cannot be read nothing changes.
 pub(super) async fn read_again(bus: &Bus, segment: &SharedSegment, (index, attempt): (usize, u32)) {
     let Some(known) = segment.view().member(index).and_then(|member| member.info.cloned()) else { return };
+    let alias_source = segment.view().alias_source();
     let read = async {
         let _turn = segment.eeproms.take(known.station).await;
         sii::claim(bus, known.station).await?;
         // Cached contents may be outdated.
-        read_one(bus, known.position, known.station, &SiiCache::new(false)).await
+        read_one(bus, (known.position, known.station), &SiiCache::new(false), alias_source).await
     };
     match read.await {
         // The reason was reported before.

@@ -149,7 +149,7 @@ async fn verified(
     let mut scans = 0;
     loop {
         let mut error = ScanError::NoAnswer;
-        match check(bus, &found.subdevices).await {
+        match check(bus, &found.subdevices, options.alias_source).await {
             Ok(Check::Same(places)) => return Ok((found, places, differs)),
             // A crashed owner may have left ports closed, behind which SubDevices are.
             Ok(Check::Different { .. }) if !is_released => is_released = release(bus).await.is_ok(),

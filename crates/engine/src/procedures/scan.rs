@@ -49,7 +49,7 @@ use super::sii::program::SiiProgramError;
 use super::sii::{self, ChainEnd, SiiCache, SiiContents};
 use crate::config::duplicate_aliases;
 use crate::event::{Notice, Subject};
-use crate::info::{InfoWarning, PdoSource, Readout, SiiExtent, SiiProblem, SubDeviceInfo};
+use crate::info::{AliasSource, InfoWarning, PdoSource, Readout, SiiExtent, SiiProblem, SubDeviceInfo};
 use crate::junction::JunctionMode;
 use crate::ring::RingState;
 use crate::ring_status::LinkCounts;
@@ -89,7 +89,7 @@ pub async fn scan(bus: &Bus, segment: &SharedSegment, options: &ScanOptions) -> 
         });
         expected = match attempt((bus, segment), options, expected, &mut power_ons).await {
             Ok(mut scanned) => {
-                complete(bus, &mut scanned.scan, options.pdos).await;
+                complete(bus, &mut scanned.scan, (options.pdos, options.sii_assignment)).await;
                 return Ok(scanned);
             }
             Err(Failure::Unsettled(now)) => {
@@ -150,9 +150,9 @@ async fn attempt(
     }
     let contents = read_while_settling(bus, options, &expected, power_ons).await?;
     bus.bwr(map::DC_RECEIVE_TIME, &[0; 4]).await?;
-    let stations = (0..total as u16).map(Position).zip(contents);
-    let describing = bus.gather(stations, |bus, (position, contents)| async move {
-        let registers = read_registers(&bus, position, station_at(position)).await;
+    let (stations, alias_source) = ((0..total as u16).map(Position).zip(contents), options.alias_source);
+    let describing = bus.gather(stations, move |bus, (position, contents)| async move {
+        let registers = read_registers(&bus, (position, station_at(position)), alias_source).await;
         registers.map(|registers| describe(registers, &contents))
     });
     let (subdevices, counted) = bus.both(describing, bus.brd(map::TYPE, 1)).await;
@@ -399,12 +399,12 @@ pub(super) async fn ask(
 /// Reads one SubDevice: SII, controller, ports, alias, receive times.
 pub(super) async fn read_one(
     bus: &Bus,
-    position: Position,
-    station: StationAddress,
+    (position, station): (Position, StationAddress),
     cache: &SiiCache,
+    alias_source: AliasSource,
 ) -> Result<SubDeviceInfo, ScanError> {
     let contents = ask(bus, position, station, cache, SiiExtent::Complete).await?;
-    Ok(describe(read_registers(bus, position, station).await?, &contents))
+    Ok(describe(read_registers(bus, (position, station), alias_source).await?, &contents))
 }
 
 /// Reads the SII of a SubDevice that a scan has described, in any state; its identification, which follows a request,
@@ -413,17 +413,18 @@ pub(super) async fn read_whole(
     bus: &Bus,
     (position, station): (Position, StationAddress),
     cache: &SiiCache,
+    alias_source: AliasSource,
 ) -> Result<SubDeviceInfo, ServiceError> {
     let contents = sii::read(bus, station, cache, SiiExtent::Complete).await.map_err(SiiProgramError::Read)?;
     let identified = Identified { contents, identification: None, pdo_source: PdoSource::Outdated };
-    Ok(describe(read_registers(bus, position, station).await?, &identified))
+    Ok(describe(read_registers(bus, (position, station), alias_source).await?, &identified))
 }
 
 /// Reads controller, ports, alias and receive times.
 pub(super) async fn read_registers(
     bus: &Bus,
-    position: Position,
-    station: StationAddress,
+    (position, station): (Position, StationAddress),
+    alias_source: AliasSource,
 ) -> Result<Readout, BusError> {
     let registers = [
         (map::TYPE, Information::LEN),
@@ -443,7 +444,7 @@ pub(super) async fn read_registers(
     } else {
         None
     };
-    Ok(Readout { position, station, alias, information, dl_status, receive_times })
+    Ok(Readout { position, station, alias, alias_source, information, dl_status, receive_times })
 }
 
 /// One of several replies, which exactly one SubDevice must have processed.

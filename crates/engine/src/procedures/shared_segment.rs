@@ -11,11 +11,14 @@ use core::pin::pin;
 use core::task::Poll;
 use core::time::Duration;
 
+use ringcat_wire::address::StationAddress;
+
 use super::attempt_results::AttemptResults;
 use super::error_statistics::ErrorStatistics;
 use super::sii::{EepromTurns, SiiCache};
 use super::undeclared::UndeclaredMailboxes;
 use crate::board::Board;
+use crate::info::AliasSource;
 use crate::link::{Link, LinkOrder};
 use crate::mail::Mailbox;
 use crate::mail::coe::Dictionaries;
@@ -165,6 +168,13 @@ impl SharedSegment {
     /// Passes an observation of clocks to the model.
     pub(crate) fn observe_clocks(&self, seen: ClockObservation<'_>) {
         self.observe(Observation::Clocks(seen));
+    }
+
+    /// The SubDevice whose alias counts as soon as it is written into its EEPROM.
+    pub(crate) fn key_for_alias(&self, station: StationAddress) -> Option<SubDeviceKey> {
+        let view = self.view();
+        let it = view.subdevices().at(station).filter(|_| view.alias_source() == AliasSource::Sii)?;
+        Some(it.key)
     }
 
     /// Passes an observation without an application to the model.

@@ -119,7 +119,8 @@ async fn read_once(bus: &Bus, segment: &SharedSegment, key: SubDeviceKey) -> Res
     let station = key.station;
     level(bus, station).await?;
     let position = segment.view().unassigned(key).map(|it| it.position);
-    let mut info = read_one(bus, position.unwrap_or_default(), station, &segment.cache).await?;
+    let alias_source = segment.view().alias_source();
+    let mut info = read_one(bus, (position.unwrap_or_default(), station), &segment.cache, alias_source).await?;
     info.data_words = read_declared(bus, segment, station).await?;
     Ok(info)
 }

@@ -10,7 +10,7 @@ use super::al_state;
 use super::configure::ConfigureError;
 use super::sii;
 use crate::config::{SubDeviceConfig, Timeouts};
-use crate::info::SubDeviceInfo;
+use crate::info::{SiiAssignment, SubDeviceInfo};
 use crate::mail::Mailbox;
 use crate::plan::plan;
 use crate::segment::setup::SetupError;
@@ -22,6 +22,7 @@ pub(crate) async fn visit(
     info: &SubDeviceInfo,
     mailbox: &Mailbox,
     state: AlState,
+    assignment: SiiAssignment,
 ) -> Result<(), ConfigureError> {
     let (station, emulated) = (info.station, info.device_emulation);
     let limits = Timeouts::default();
@@ -56,10 +57,13 @@ pub(crate) async fn visit(
     for manager in managers {
         bus.fpwr(station, map::sync_manager(manager.index), &manager.register.encode()).await?;
     }
-    sii::assign(bus, station, true).await?;
+    let is_lent = state == AlState::Boot || assignment.lends_towards_preop();
+    if is_lent {
+        sii::assign(bus, station, true).await?;
+    }
     let result = request(AlState::Init, state).await;
     // A boot loader may need the EEPROM as long as it runs.
-    if state != AlState::Boot || result.is_err() {
+    if is_lent && (state != AlState::Boot || result.is_err()) {
         sii::claim(bus, station).await?;
     }
     result?;

@@ -1,5 +1,6 @@
 //! Settings at activation.
 
+use crate::info::{AliasSource, SiiAssignment};
 use crate::junction::JunctionMode;
 
 /// What follows a failed configuration.
@@ -46,4 +47,8 @@ pub struct Choices {
     pub pdos: ReadPdos,
     /// Without an application object dictionaries are read.
     pub dictionaries: bool,
+    /// Where aliases are read.
+    pub alias_source: AliasSource,
+    /// When EEPROMs belong to their PDIs.
+    pub sii_assignment: SiiAssignment,
 }

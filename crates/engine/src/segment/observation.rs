@@ -130,6 +130,8 @@ pub enum More<'a> {
     Sii(&'a SubDeviceInfo),
     /// Words of its memory by which declarations may find it; without words that its memory does not have.
     DataWords(Vec<DataWord>),
+    /// The alias that was written into its EEPROM, where aliases are those of SIIs.
+    Alias(u16),
 }
 
 /// An observation.

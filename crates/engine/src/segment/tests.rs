@@ -85,6 +85,8 @@ fn choices() -> Choices {
         supervision: true,
         pdos: crate::segment::ReadPdos::Missing,
         retries: Retries::Always,
+        alias_source: crate::info::AliasSource::Sii,
+        sii_assignment: crate::info::SiiAssignment::TowardsPreOp,
     }
 }
 

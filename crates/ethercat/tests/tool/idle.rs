@@ -154,6 +154,10 @@ fn siis_and_aliases_are_written_after_a_check() {
     assert_eq!(bench.good(&["alias", "-p2", "0x4d2"]), "");
     let written = bench.tool(&["sii_read", "-p2"]).bytes;
     assert_eq!(written[8..10], 1234_u16.to_le_bytes());
+    // The alias of the SII counts at once, that of the register (0x0012) from the next power-on on.
+    let listed = bench.good(&["slaves", "-a1234"]);
+    assert!(listed.starts_with("2  1234:0  "), "{listed}");
+    assert_eq!(bench.good(&["reg_read", "-p2", "-tuint16", "0x12"]), "0x0000 0\n");
     let warned = bench.tool(&["alias", "-p", "9", "1"]);
     assert_eq!((warned.code, warned.err.as_str()), (Some(0), "Warning: Selection matches no slaves!\n"));
 }

@@ -11,13 +11,14 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use ringcat::AlState;
+use ringcat::daemon::BusSettings;
 use ringcat::esi::load_segment;
 use ringcat::piped::segment::PipedSegment;
 use ringcat::sim::cable::HostLink;
 use ringcat::sim::fault::Fault;
 use ringcat::sim::network::Network;
 use ringcatd::daemon::{Daemon, STOP_LIMIT};
-use ringcatd::master::Master;
+use ringcatd::master::{Master, Settings};
 use ringcatd::rights::Rights;
 use ringcatd::segment_process::serve;
 use ringcatd::wires::Wires;
@@ -85,13 +86,20 @@ impl Bench {
 
     /// The same where other users have these rights.
     pub fn start_for(file: &Path, name: &str, rights: Rights) -> Bench {
-        let bench = Bench::begin(file, name, rights);
+        let bench = Bench::begin(file, name, rights, BusSettings::default());
+        bench.wait_for_preop();
+        bench
+    }
+
+    /// The same where the master has these settings.
+    pub fn start_with(file: &Path, name: &str, settings: BusSettings) -> Bench {
+        let bench = Bench::begin(file, name, Rights::default(), settings);
         bench.wait_for_preop();
         bench
     }
 
     /// The same, without waiting for PREOP.
-    fn begin(file: &Path, name: &str, rights: Rights) -> Bench {
+    fn begin(file: &Path, name: &str, rights: Rights, bus: BusSettings) -> Bench {
         let (near, far) = UnixStream::pair().expect("a pair");
         let (seen, file) = (Arc::new(Seen::default()), file.to_owned());
         let shown = seen.clone();
@@ -119,7 +127,9 @@ impl Bench {
             serve(&mut segment, &far, show).expect("the daemon is there");
         });
         let socket = std::env::temp_dir().join(format!("ringcat-ffi-{name}-{}", std::process::id()));
-        let master = Master::new(0, name.to_owned(), Wires::to_segment(near).expect("it is right"));
+        let mut settings = Settings::new(0, name.to_owned());
+        settings.bus = bus;
+        let master = Master::start(settings, Wires::to_segment(near).expect("it is right"));
         let daemon = Daemon::start(vec![master], &socket, rights, STOP_LIMIT).expect("it listens");
         Bench { seen, looks, daemon: Some(daemon), segment: Some(segment), socket }
     }
@@ -255,7 +265,7 @@ fn a_program_that_starts_with_its_daemon_reaches_op() {
     std::fs::write(&segment, format!("[segment]\n{}", device.repeat(4))).expect("it can be written");
     for round in 0..15 {
         let begin = Instant::now();
-        let bench = Bench::begin(&segment, "early", Rights::default());
+        let bench = Bench::begin(&segment, "early", Rights::default(), BusSettings::default());
         std::thread::sleep(Duration::from_millis(2 * round));
         let mut command = Command::new("timeout");
         command.arg("10").arg(&cost).args(["cycles", "1000", "10"]).env("RINGCAT_SOCKET", &bench.socket);

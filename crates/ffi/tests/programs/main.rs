@@ -21,4 +21,6 @@ mod network;
 mod operator;
 mod readme;
 mod realtime;
+mod record;
 mod shape;
+mod switches;

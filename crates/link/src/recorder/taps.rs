@@ -136,6 +136,12 @@ impl Tap {
         self.to_unix_ns = *self.shared.clock.get_or_init(|| unix_now_ns().wrapping_sub(now_ns));
     }
 
+    /// Whether there is a reader.
+    #[inline]
+    pub fn is_read(&self) -> bool {
+        self.shared.is_on.load(Ordering::Relaxed)
+    }
+
     /// Adds a frame of the interface at this position in the list of interfaces, if there is a reader. Does not
     /// allocate or wait.
     #[inline]

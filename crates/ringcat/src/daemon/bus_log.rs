@@ -10,7 +10,7 @@ mod lines;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::LiveStatus;
@@ -18,6 +18,7 @@ pub use ringcat_link::operator::{OperatorLines, Priority};
 
 pub use self::lines::Lines;
 use self::lines::{Counts, Sample};
+use super::frame_record::{FrameRecord, RecordReason};
 use super::ownership::OwnershipWatch;
 use super::serving;
 use crate::services::Services;
@@ -39,18 +40,36 @@ pub struct Followed {
     supervisor: SupervisorThread,
     ownership: Option<OwnershipWatch>,
     lines: Arc<Mutex<Lines>>,
+    /// Also what cyclic frames show.
+    with_cyclic: bool,
+    record: Option<Arc<Mutex<FrameRecord>>>,
 }
 
 impl Followed {
     /// The acyclic half of a bus. All its events are taken from it.
     pub fn new(supervisor: SupervisorThread) -> Followed {
-        Followed { supervisor, ownership: None, lines: Arc::default() }
+        Followed { supervisor, ownership: None, lines: Arc::default(), with_cyclic: true, record: None }
     }
 
     /// Also whether the bus of a daemon was taken back.
     #[must_use]
     pub fn with_ownership(mut self, ownership: Option<OwnershipWatch>) -> Followed {
         self.ownership = ownership;
+        self
+    }
+
+    /// Whether there are lines about what cyclic frames show: working counters, and datagrams that were lost, unmatched
+    /// or skipped. There are by default.
+    #[must_use]
+    pub fn with_cyclic_lines(mut self, with_cyclic: bool) -> Followed {
+        self.with_cyclic = with_cyclic;
+        self
+    }
+
+    /// Also keeps the last frames, and writes them into a file at a fault.
+    #[must_use]
+    pub fn with_record(mut self, record: Option<FrameRecord>) -> Followed {
+        self.record = record.map(|record| Arc::new(Mutex::new(record)));
         self
     }
 
@@ -105,19 +124,34 @@ impl Drop for BusLog {
 }
 
 fn run(followed: &Followed, ends: &Receiver<()>, mut print: impl FnMut(Priority, &str)) {
-    let Followed { supervisor, ownership, lines } = followed;
+    let Followed { supervisor, ownership, lines, with_cyclic, record } = followed;
     let (mut looks, mut next_message) = (0_u32, 0);
     loop {
         let is_last = ends.recv_timeout(LOOK) != Err(RecvTimeoutError::Timeout);
         looks += 1;
         let mut lines = lines.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut record = record.as_ref().map(|record| record.lock().unwrap_or_else(PoisonError::into_inner));
         if let Some(ownership) = ownership {
-            lines.own(ownership.now(), ownership.cause());
+            let is_new = lines.own(ownership.now(), ownership.cause());
+            if let Some(record) = record.as_mut().filter(|_| is_new && ownership.is_taken_back()) {
+                record.note(RecordReason::TakenBack, Instant::now());
+            }
+        }
+        if let Some(record) = &mut record {
+            record.take_frames();
         }
         take_messages(supervisor, &mut lines, &mut next_message);
-        look(supervisor, &mut lines, is_last, looks.is_multiple_of(LOOKS_PER_SUMMARY) || is_last);
-        let all = lines.pop();
+        let is_second_over = *with_cyclic && (looks.is_multiple_of(LOOKS_PER_SUMMARY) || is_last);
+        look((supervisor, *with_cyclic), &mut lines, (is_last, is_second_over), record.as_deref_mut());
+        let mut all = lines.pop();
         drop(lines);
+        if let Some(record) = &mut record {
+            let now = Instant::now();
+            all.extend(record.look(now, supervisor.observer().is_some()));
+            if is_last {
+                all.extend(record.end(now));
+            }
+        }
         for (priority, line) in all {
             print(priority, &line);
         }
@@ -147,11 +181,21 @@ fn sample(supervisor: &SupervisorThread, live: &LiveStatus, is_last: bool) -> Op
     Some(Sample { is_up: seen.is_up.contains(&true), responding: seen.responding(), al_states: seen.al_states })
 }
 
-fn look(supervisor: &SupervisorThread, lines: &mut Lines, is_last: bool, is_second_over: bool) {
+fn look(
+    (supervisor, with_cyclic): (&SupervisorThread, bool),
+    lines: &mut Lines,
+    (is_last, is_second_over): (bool, bool),
+    mut record: Option<&mut FrameRecord>,
+) {
     let Ok(live) = supervisor.live_status() else { return };
     let seen = sample(supervisor, &live, is_last);
     while let Some(event) = supervisor.pop_event() {
-        lines.take(&event);
+        if let Some(record) = &mut record {
+            record.take(&event.event, Instant::now());
+        }
+        if with_cyclic || !lines::is_cyclic(&event.event) {
+            lines.take(&event);
+        }
     }
     if let Some(seen) = seen {
         lines.look(seen);

@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 use ringcat_control::client::Client;
 use ringcat_control::connection::Connection;
 use ringcat_control::message::{Content, HandedLinks, Message};
+use ringcat_control::settings::BusSettings;
 use ringcat_engine::Scan;
 use ringcat_engine::event::{LogFilter, LogLevel, Subject, Subjects};
 use ringcat_engine::knowledge::Handover;
@@ -25,6 +26,7 @@ use super::ownership::{Ownership, OwnershipWatch};
 use super::query_threads::QueryThreads;
 use super::received::Received;
 use super::receiver::Receiver;
+use super::settings::options_with;
 use crate::links::Links;
 use crate::main_device::Options;
 use crate::services::Services;
@@ -43,6 +45,7 @@ pub struct OwnedBus {
     supervisor: SupervisorThread,
     pub(super) scan: Option<Scan>,
     handed: HandedLinks,
+    settings: BusSettings,
     /// A daemon that is started anew detects by it that this process has the bus.
     _lock: Option<OwnedFd>,
     links: Option<DaemonLinks>,
@@ -90,10 +93,10 @@ impl OwnedBus {
         let orders = Orders::new()?;
         let received = Received::take(&connection, master, &orders)?;
         let Received { bus: handed, cyclic, acyclic, lock, interfaces, knowledge } = received;
-        let in_threads = prepare.clone();
-        let main = acyclic.addresses().main;
+        let (in_threads, main) = (prepare.clone(), acyclic.addresses().main);
         let acyclic = around(&handed.links, acyclic)?;
-        let (options, is_known) = (options.clone().with_idle_operation(true), knowledge.is_some());
+        let (options, is_known) = (options_with(&handed.settings, options), knowledge.is_some());
+        let options = options.with_idle_operation(true);
         let supervisor = match knowledge {
             Some(knowledge) => {
                 let known = (knowledge, Handover::Orderly);
@@ -109,7 +112,7 @@ impl OwnedBus {
         let scan = if is_known { supervisor.finish_scan(|| ()).ok() } else { None };
         let queries =
             QueryThreads::start(&supervisor, &connection, &in_threads).map_err(crate::error::Error::Thread)?;
-        let (ownership, links) = (OwnershipWatch::default(), handed.links);
+        let (ownership, links, settings) = (OwnershipWatch::default(), handed.links, handed.settings);
         let receiver = Receiver {
             supervisor: supervisor.clone(),
             connection: connection.clone(),
@@ -122,7 +125,20 @@ impl OwnedBus {
         let receiver = receiver.start(in_threads).map_err(crate::error::Error::Thread)?;
         let (cyclic, receiver, process) = (Some(cyclic), Some(receiver), std::process::id());
         let (handed, links, _lock, _ethernet) = (links, cyclic, lock, ethernet);
-        Ok(OwnedBus { supervisor, scan, handed, _lock, links, _ethernet, connection, ownership, receiver, process })
+        let bus = OwnedBus {
+            supervisor,
+            scan,
+            handed,
+            settings,
+            _lock,
+            links,
+            _ethernet,
+            connection,
+            ownership,
+            receiver,
+            process,
+        };
+        Ok(bus)
     }
 
     /// The acyclic half. It has the SubDevices in the knowledge of the daemon.
@@ -133,6 +149,12 @@ impl OwnedBus {
     /// What the links are: interfaces with their names, or pipes to a simulated segment.
     pub fn handed(&self) -> &HandedLinks {
         &self.handed
+    }
+
+    /// Settings of the master, which the daemon has from its configuration. Those that are options of a MainDevice have
+    /// priority over the options of this program.
+    pub fn settings(&self) -> &BusSettings {
+        &self.settings
     }
 
     /// Takes the links of the cyclic half, for an activation.

@@ -137,7 +137,8 @@ impl<S: Services> SubDevice<S> {
     }
 
     /// Writes its alias into the EEPROM, with the new checksum. A checksum that is wrong before is corrected only with
-    /// `force`. The alias is valid from the next start of the SubDevice on.
+    /// `force`. As an alias of the SII it counts at once, as one of the register from the next start of the SubDevice
+    /// on ([`AliasSource`](crate::AliasSource)).
     pub fn write_alias(self, alias: u16, force: bool) -> S::Outcome<SiiWritten, SubDeviceError> {
         self.ask(move |engine, subdevice| engine.start_alias_write(subdevice, alias, force).ended())
     }

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use ringcat_control::BusSettings;
+
 use crate::source::{MasterOption, SafeState};
 
 /// The contents of a configuration file.
@@ -35,6 +37,8 @@ pub struct Own {
     pub debug_level: Option<u32>,
     /// Whether a master waits until its backup interface is there.
     pub needs_backup: bool,
+    /// What holds for whatever drives a master.
+    pub bus: BusSettings,
     /// States of SubDevices after the end of an application.
     pub safe_states: Vec<SafeState>,
 }

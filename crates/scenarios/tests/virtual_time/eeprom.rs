@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use ringcat::simulated::SimulatedSegment;
-use ringcat::{MainDevice, Options, automatic};
+use ringcat::{MainDevice, Options, SiiAssignment, SubDeviceConfig, automatic};
 use ringcat_engine::main_device::SubDeviceState;
 use ringcat_sim::cable::{CableId, DeviceIndex, Direction, HostLink};
 use ringcat_sim::fault::Fault;
@@ -29,6 +29,17 @@ fn world(target: AlState, prepare: impl FnOnce(&mut ringcat_sim::network::Networ
     .expect("scan and activation");
     world.evaluate_latched(false);
     world
+}
+
+fn world_with(options: &Options, change: impl Fn(SubDeviceConfig) -> SubDeviceConfig) -> World {
+    let network = ring(descriptions(&["coupler", "analog-input-4"]), NetworkOptions::default());
+    World::with(1, network, options, |scan| {
+        let mut declaration = automatic(&scan.subdevices, CYCLE);
+        let declared = &mut declaration.subdevices[DEVICE.0];
+        *declared = change(declared.clone());
+        declaration
+    })
+    .expect("scan and activation")
 }
 
 fn belongs_to_pdi(world: &World) -> bool {
@@ -77,4 +88,22 @@ fn a_late_response_to_a_read_command_does_not_end_the_scan() {
         let scan = main_device.scan().unwrap_or_else(|error| panic!("delayed at {at_us} us: {error}"));
         assert_eq!(scan.subdevices.len(), 1);
     }
+}
+
+// covers: 5.2, eeprom
+#[test]
+fn the_eeprom_is_not_lent_where_it_belongs_to_ethercat() {
+    let mut always = world_with(&Options::default(), |config| config);
+    always.until(Duration::from_secs(1), "the PDI has the EEPROM", belongs_to_pdi);
+    let never = Options::default().with_sii_assignment(SiiAssignment::Never);
+    let settled = |world: &World| world.application().states()[DEVICE.0] == SubDeviceState::Settled(AlState::Op);
+    let mut world = world_with(&never, |config| config);
+    world.until(Duration::from_secs(1), "in OP", |world| {
+        assert!(!belongs_to_pdi(world), "on the way to OP");
+        settled(world)
+    });
+    // A declaration that gives it away is followed.
+    let mut kept = world_with(&never, SubDeviceConfig::sii_to_pdi);
+    kept.until(Duration::from_secs(1), "in OP", settled);
+    assert!(belongs_to_pdi(&kept));
 }

@@ -2,15 +2,17 @@
 
 use std::time::Duration;
 
-use ringcat::{ServiceError, SubDeviceId};
+use ringcat::simulated::SimulatedSegment;
+use ringcat::{AliasSource, Error, MainDevice, Options, ServiceError, SubDeviceConfig, SubDeviceId, automatic};
 use ringcat_engine::{SiiProgramError, SiiWritten};
 use ringcat_sim::cable::DeviceIndex;
 use ringcat_sim::fault::{Fault, SpoiltWrite};
 use ringcat_sim::network::NetworkOptions;
+use ringcat_wire::address::Position;
 use ringcat_wire::register::map;
 use ringcat_wire::sii::SiiError;
 use scenarios::segments::{descriptions, line};
-use scenarios::world::World;
+use scenarios::world::{CYCLE, World};
 
 const KINDS: [&str; 3] = ["coupler", "digital-input-8", "analog-input-4"];
 const DEVICE: DeviceIndex = DeviceIndex(2);
@@ -180,4 +182,31 @@ fn a_written_alias_has_a_checksum_and_is_used_after_a_restart() {
     assert!(matches!(error, SiiProgramError::Checksum { .. }), "{error}");
     assert!(alias(&mut world, true).is_ok());
     assert!(ringcat_wire::sii::Sii::parse(&image(&world)).is_ok());
+}
+
+// covers: 2.7, 4.7, declaration, eeprom
+#[test]
+fn a_written_alias_counts_at_once_in_the_sii_and_after_power_on_in_the_register() {
+    const AT: usize = 1;
+    for (source, before_power_on) in [(AliasSource::Sii, 77), (AliasSource::Register, 0)] {
+        for idle_operation in [false, true] {
+            let options = Options::default().with_alias_source(source).with_idle_operation(idle_operation);
+            let links = SimulatedSegment::from_toml("[[device]]\ntype = \"digital-output-8\"\ncount = 3\n");
+            let mut main_device = MainDevice::request(links.expect("it is right"), &options);
+            let alias = |main_device: &mut MainDevice<SimulatedSegment>| {
+                main_device.scan().expect("a scan").subdevices[AT].alias
+            };
+            assert_eq!(alias(&mut main_device), 0);
+            main_device.subdevice(Position(AT as u16)).write_alias(77, false).expect("it is written");
+            assert_eq!(alias(&mut main_device), before_power_on, "{source:?}");
+            main_device.links_mut().network_mut().apply(Fault::PowerOff(DeviceIndex(AT)));
+            main_device.links_mut().network_mut().apply(Fault::PowerOn(DeviceIndex(AT)));
+            assert_eq!(alias(&mut main_device), 77, "{source:?}");
+            // An activation finds it by the alias.
+            let mut declaration = automatic(&main_device.subdevices(), CYCLE);
+            declaration.subdevices[AT] = SubDeviceConfig::at_alias(77, 0);
+            let application = main_device.activate(declaration).map_err(Error::from).expect("it is found");
+            drop(application);
+        }
+    }
 }

@@ -54,8 +54,9 @@ pub(crate) async fn scan_again(
     let reading = while_reading(segment, &readdressed, read_new(bus, options, fresh));
     let Some(read) = reading.await else { return Ok(None) };
     let mut read = read?.into_iter();
+    let alias_source = options.alias_source;
     let registers =
-        bus.gather(places, |bus, (position, station)| async move { read_registers(&bus, position, station).await });
+        bus.gather(places, move |bus, place| async move { read_registers(&bus, place, alias_source).await });
     let mut subdevices = Vec::with_capacity(now.stations.len());
     for registers in registers.await {
         let registers = registers?;
@@ -165,19 +166,19 @@ async fn read_new(
     if fresh.is_empty() {
         return Ok(Vec::new());
     }
-    let cache = options.cache.clone();
+    let (cache, alias_source) = (options.cache.clone(), options.alias_source);
     let read = bus.gather(fresh, |bus, (position, given)| {
         let (cache, station) = (cache.clone(), given.station);
         async move {
             level(&bus, station).await?;
             let identified = ask(&bus, position, station, &cache, SiiExtent::Complete).await?;
             let identified = Identified { pdo_source: given.pdo_source(), ..identified };
-            Ok::<_, ScanError>(describe(read_registers(&bus, position, station).await?, &identified))
+            Ok::<_, ScanError>(describe(read_registers(&bus, (position, station), alias_source).await?, &identified))
         }
     });
     let subdevices = read.await.into_iter().collect::<Result<Vec<_>, _>>()?;
     let main_count = subdevices.len();
     let mut scan = Scan { subdevices, topology: Topology::default(), main_count, redundant_count: 0 };
-    complete(bus, &mut scan, options.pdos).await;
+    complete(bus, &mut scan, (options.pdos, options.sii_assignment)).await;
     Ok(scan.subdevices)
 }

@@ -11,7 +11,7 @@ use ringcat_wire::datagram::Target;
 use ringcat_wire::register::{DlStatus, Information, SyncManager, map};
 
 use crate::config::SubDeviceConfig;
-use crate::info::{ControllerInfo, SubDeviceInfo};
+use crate::info::{AliasSource, ControllerInfo, SubDeviceInfo};
 use crate::mail::InUse;
 use crate::plan::{SmPlan, plan};
 use crate::ring_status::LinkCounts;
@@ -77,7 +77,11 @@ fn is_same(read: &SyncManager, planned: &SyncManager) -> bool {
 }
 
 /// Compares the segment with the SubDevices that are known, by position.
-pub(super) async fn check(bus: &Bus, known: &[Rc<SubDeviceInfo>]) -> Result<Check, BusError> {
+pub(super) async fn check(
+    bus: &Bus,
+    known: &[Rc<SubDeviceInfo>],
+    alias_source: AliasSource,
+) -> Result<Check, BusError> {
     let items: Vec<(u16, u8)> = (0..).zip(known.iter().map(|info| managers_of(info))).collect();
     let reading = bus.gather(items, |bus, (position, managers)| async move { read(&bus, position, managers).await });
     let (places, counted) = bus.both(reading, bus.brd(map::TYPE, 1)).await;
@@ -85,20 +89,22 @@ pub(super) async fn check(bus: &Bus, known: &[Rc<SubDeviceInfo>]) -> Result<Chec
     let places = places.into_iter().collect::<Result<Vec<Option<Place>>, BusError>>()?;
     let counts = LinkCounts { main: counted.main.0, redundant: counted.redundant.0 };
     let is_as_known = |(place, info): (&Option<Place>, &Rc<SubDeviceInfo>)| {
-        let is_it = |place: &Place| is_one(place, info) && is_cabled(place, info);
+        let is_it = |place: &Place| is_one(place, info, alias_source) && is_cabled(place, info);
         place.as_ref().is_some_and(is_it)
     };
     if usize::from(counted.wkc().0) == known.len() && places.iter().zip(known).all(is_as_known) {
         return Ok(Check::Same(places.into_iter().flatten().collect()));
     }
     let of = |place: &Place| known.iter().find(|info| info.station == place.station);
-    let replaced = places.iter().flatten().filter(|place| of(place).is_some_and(|info| !is_one(place, info)));
+    let replaced =
+        places.iter().flatten().filter(|place| of(place).is_some_and(|info| !is_one(place, info, alias_source)));
     Ok(Check::Different { replaced: replaced.map(|place| place.station).collect(), counts })
 }
 
-/// Whether it is the same SubDevice, by its registers.
-fn is_one(place: &Place, info: &SubDeviceInfo) -> bool {
-    (place.station, place.alias, place.controller) == (info.station, info.alias, info.controller)
+/// Whether it is the same SubDevice, by its registers. An alias of the SII is not in them.
+fn is_one(place: &Place, info: &SubDeviceInfo, alias_source: AliasSource) -> bool {
+    let alias_fits = alias_source == AliasSource::Sii || place.alias == info.alias;
+    alias_fits && (place.station, place.controller) == (info.station, info.controller)
 }
 
 /// Whether its ports are connected as before.

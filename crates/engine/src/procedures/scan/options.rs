@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use crate::info::SiiExtent;
+use crate::info::{AliasSource, SiiAssignment, SiiExtent};
 use crate::junction::JunctionMode;
 use crate::procedures::sii::SiiCache;
 use crate::segment::ReadPdos;
@@ -25,4 +25,8 @@ pub struct ScanOptions {
     pub enhanced_line_crossed: bool,
     /// Dictionaries that are read for PDOs.
     pub pdos: ReadPdos,
+    /// Where aliases are read.
+    pub alias_source: AliasSource,
+    /// When EEPROMs belong to their PDIs.
+    pub sii_assignment: SiiAssignment,
 }

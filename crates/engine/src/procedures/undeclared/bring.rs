@@ -52,10 +52,11 @@ impl Bringing<'_> {
     /// Brings it to the requested state, through INIT. Its mailbox is open from PREOP and BOOT on.
     pub(super) async fn bring(mut self, target: AlState) -> Result<(), ConfigureError> {
         unmap(self.bus, &self.info).await?;
+        let assignment = self.segment.view().sii_assignment();
         match target {
-            AlState::Init | AlState::Boot => visit(self.bus, &self.info, &self.mailbox, target).await,
+            AlState::Init | AlState::Boot => visit(self.bus, &self.info, &self.mailbox, target, assignment).await,
             AlState::PreOp | AlState::SafeOp | AlState::Op => {
-                visit(self.bus, &self.info, &self.mailbox, AlState::PreOp).await?;
+                visit(self.bus, &self.info, &self.mailbox, AlState::PreOp, assignment).await?;
                 self.read_pdos(true).await;
                 if target == AlState::PreOp {
                     return Ok(());

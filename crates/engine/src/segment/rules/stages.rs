@@ -86,6 +86,7 @@ impl Segment {
                 }
             }
             More::DataWords(words) => info.data_words = words,
+            More::Alias(alias) => info.alias = alias,
         }
         let before = core::mem::replace(known, Rc::new(info));
         self.subdevices.replace(&before, known);

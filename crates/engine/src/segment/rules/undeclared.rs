@@ -6,6 +6,7 @@ use ringcat_wire::address::StationAddress;
 use ringcat_wire::al::AlState;
 
 use crate::event::Event;
+use crate::info::{AliasSource, SiiAssignment};
 use crate::segment::addressed::Addressed;
 use crate::segment::choices::Retries;
 use crate::segment::effect::{Effects, Task};
@@ -26,6 +27,16 @@ impl Segment {
     /// Whether broadcasts watch the segment without an application.
     pub fn has_idle_operation(&self) -> bool {
         self.choices.idle_operation
+    }
+
+    /// Where aliases are read.
+    pub fn alias_source(&self) -> AliasSource {
+        self.choices.alias_source
+    }
+
+    /// When EEPROMs belong to their PDIs.
+    pub fn sii_assignment(&self) -> SiiAssignment {
+        self.choices.sii_assignment
     }
 
     /// What follows a failed configuration.

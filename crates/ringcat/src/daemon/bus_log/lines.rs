@@ -58,6 +58,11 @@ pub struct Lines {
 /// A line with its priority.
 pub(super) type Line = (Priority, String);
 
+/// Whether an event is what cyclic frames show.
+pub(super) const fn is_cyclic(event: &Event) -> bool {
+    matches!(event, Event::Domain { .. } | Event::Skipped { .. })
+}
+
 impl Lines {
     fn push(&mut self, priority: Priority, text: String) {
         self.lines.push((priority, text));
@@ -85,10 +90,10 @@ impl Lines {
         }
     }
 
-    /// Takes whether this process has the bus still, and why not.
-    pub(super) fn own(&mut self, now: Ownership, cause: &str) {
+    /// Takes whether this process has the bus still, and why not. Whether that is new.
+    pub(super) fn own(&mut self, now: Ownership, cause: &str) -> bool {
         if self.ownership.replace(now) == Some(now) {
-            return;
+            return false;
         }
         let (priority, text) = match now {
             Ownership::TakenBack => {
@@ -98,9 +103,10 @@ impl Lines {
             Ownership::DaemonEnded => {
                 (Priority::Warning, "ringcatd has ended; this process continues to drive the master.".to_owned())
             }
-            _ => return,
+            _ => return true,
         };
         self.push(priority, text);
+        true
     }
 
     /// Takes an event.

@@ -37,6 +37,9 @@ pub(super) fn declared(supervisor: &SupervisorThread, from: u16) -> Result<Piece
     })
 }
 
+/// A vendor or a product that is not compared.
+const ANY: u32 = 0xFFFF_FFFF;
+
 /// Alias and position as `ecrt.h` counts them.
 fn place(address: ConfigAddress) -> (u16, u16) {
     match address {
@@ -54,7 +57,7 @@ fn line(declared: &DeclaredSubDevice) -> DeclaredLine {
     let mut line = DeclaredLine {
         alias,
         position,
-        identity: [config.expected.vendor_id, config.expected.product_code].map(Option::unwrap_or_default),
+        identity: [config.expected.vendor_id, config.expected.product_code].map(|it| it.unwrap_or(ANY)),
         found: declared.position.filter(|_| !declared.is_absent).map(|position| position.0),
         watchdog: [config.watchdog_divider, config.watchdog_intervals],
         sync_managers: sync_managers(config, declared.info.as_ref()),

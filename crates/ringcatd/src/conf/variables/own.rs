@@ -3,6 +3,8 @@
 use std::fmt::Display;
 use std::str::FromStr;
 
+use ringcat_control::BusSettings;
+
 use super::{MOST_MASTERS, Reading, master};
 use crate::rights::{group, mode};
 use crate::source::SafeState;
@@ -19,6 +21,8 @@ impl Reading {
         let own = &mut self.conf.own;
         let is_set = !value.is_empty();
         match name {
+            _ if BusSettings::variables().any(|it| it == name) && !is_set => Ok("empty: the default".to_owned()),
+            _ if BusSettings::variables().any(|it| it == name) => own.bus.set(name, value),
             "SOCKET" | "MODE" | "GROUP" | "STOP_LIMIT" | "EOE" | "DEBUG_LEVEL" | "BACKUP" if !is_set => {
                 Ok("empty: the default".to_owned())
             }
@@ -56,11 +60,11 @@ impl Reading {
                 let goes_on = "a master goes on without its backup interface";
                 Ok(if own.needs_backup { waits } else { goes_on }.to_owned())
             }
-            _ => Err(
-                "expected RINGCAT_SOCKET, _MODE, _GROUP, _STOP_LIMIT, _EOE, _DEBUG_LEVEL, _BACKUP, _MASTERx_SIM or \
-                      _MASTERx_SAFE_STATE"
-                    .to_owned(),
-            ),
+            _ => Err(format!(
+                "expected RINGCAT_SOCKET, _MODE, _GROUP, _STOP_LIMIT, _EOE, _DEBUG_LEVEL, _BACKUP, _{}, _MASTERx_SIM \
+                 or _MASTERx_SAFE_STATE",
+                BusSettings::variables().collect::<Vec<_>>().join(", _")
+            )),
         }
     }
 

@@ -1,0 +1,96 @@
+//! The record of the last seconds before a fault, written by a program with the settings of its daemon, and by the
+//! daemon when the program is killed.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use ringcat::daemon::BusSettings;
+use ringcat::sim::cable::DeviceIndex;
+use ringcat::sim::fault::Fault;
+
+use crate::daemon::{Bench, wait_for_line};
+use crate::library::{here, program, workshop};
+
+/// A file is there within this time on a busy machine.
+const LONG: Duration = Duration::from_secs(30);
+const SEGMENT: &str = "[[device]]\ntype = \"digital-output-8\"\ncount = 4\n";
+
+/// The file that is written for this reason.
+fn written(directory: &Path, reason: &str) -> PathBuf {
+    let begin = Instant::now();
+    loop {
+        let entries = std::fs::read_dir(directory).expect("it is there").flatten();
+        let mut paths = entries.map(|it| it.path());
+        // A file is complete when it does not grow any more.
+        let found = paths.find(|it| it.to_string_lossy().ends_with(&format!("-{reason}.pcapng")));
+        if let Some(path) = found {
+            let size = || std::fs::metadata(&path).map_or(0, |data| data.len());
+            let before = size();
+            std::thread::sleep(Duration::from_millis(200));
+            if before > 0 && size() == before {
+                return path;
+            }
+        }
+        assert!(begin.elapsed() < LONG, "there is no file: {reason}");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// Frames of a capture that Wireshark takes for EtherCAT, sent and received; `None` without tshark.
+fn frames(path: &Path) -> Option<[usize; 2]> {
+    let count = |direction: u32| {
+        let filter = format!("ecatf && frame.packet_flags_direction == {direction}");
+        let output = Command::new("tshark").arg("-r").arg(path).args(["-Y", &filter]).output().ok()?;
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        Some(String::from_utf8_lossy(&output.stdout).lines().count())
+    };
+    Some([count(2)?, count(1)?])
+}
+
+fn check(path: &Path) {
+    match frames(path) {
+        Some([sent, received]) => {
+            println!("{}: {sent} sent, {received} received", path.display());
+            assert!(sent > 100 && received > 100 && received <= sent, "{sent} sent, {received} received");
+        }
+        None => println!("skipped: there is no tshark"),
+    }
+}
+
+// covers: c-interface, daemon, capture
+#[test]
+fn a_fault_writes_the_frames_of_the_last_seconds() {
+    let Some(program) = program(&here().join("tests/c/lossless.c"), &[]) else { return };
+    let directory = workshop().join("record");
+    let _ = std::fs::remove_dir_all(&directory);
+    std::fs::create_dir_all(&directory).expect("a directory");
+    let segment = workshop().join("record.toml");
+    std::fs::write(&segment, SEGMENT).expect("it can be written");
+    let mut settings = BusSettings::default();
+    (settings.debug_ring.is_on, settings.debug_ring.directory) = (true, directory.clone());
+    let bench = Bench::start_with(&segment, "record", settings);
+    let mut command = bench.command(&program);
+    let mut child = command.args(["2000", "once"]).stdin(Stdio::piped()).spawn().expect("it runs");
+    let _lines = wait_for_line(&mut child, "op");
+    std::thread::sleep(Duration::from_millis(500));
+    assert_eq!(std::fs::read_dir(&directory).expect("it is there").count(), 0, "there was no fault");
+    bench.inside(|segment| segment.network_mut().apply(Fault::PowerOff(DeviceIndex(3))));
+    let entries = |directory: &Path| std::fs::read_dir(directory).expect("it is there").count();
+    let begin = Instant::now();
+    while entries(&directory) == 0 {
+        assert!(begin.elapsed() < LONG, "there is no file");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let first = std::fs::read_dir(&directory).expect("it is there").flatten().next().expect("there is one").path();
+    let name = first.to_string_lossy().into_owned();
+    let reason = ["lost", "working-counter"].into_iter().find(|reason| name.ends_with(&format!("-{reason}.pcapng")));
+    check(&written(&directory, reason.expect(&name)));
+    let before = bench.connected_ns();
+    child.kill().expect("it runs");
+    child.wait().expect("it has ended");
+    bench.wait_for_connection_after(before);
+    // The daemon begins with an empty record; its file has the frames behind the end.
+    let path = written(&directory, "owner-lost");
+    assert!(std::fs::metadata(&path).expect("it is there").len() > 500, "{}", path.display());
+}

@@ -1,0 +1,65 @@
+//! What the switches of `configure` decide, as settings: variables of a program that opens links itself, and settings
+//! of a daemon, which a program gets with its bus.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use ringcat::daemon::BusSettings;
+
+use crate::daemon::Bench;
+use crate::library::{here, program, workshop};
+
+/// Two SubDevices of one kind, the second one with an alias.
+fn segment(test: &str) -> PathBuf {
+    let path = workshop().join(format!("switches-{test}.toml"));
+    let text = "[[device]]\ntype = \"digital-output-8\"\n[[device]]\ntype = \"digital-output-8\"\nalias = 7\n";
+    std::fs::write(&path, text).expect("it can be written");
+    path
+}
+
+/// What the program says of a SubDevice at a place and with an identity; what it reports if it fails.
+fn said(command: &mut Command, place: [&str; 4]) -> Result<String, String> {
+    let Output { status, stdout, stderr } = command.args(place).output().expect("it runs");
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    if status.success() { Ok(text(&stdout)) } else { Err(text(&stderr)) }
+}
+
+const ANY: &str = "0xffffffff";
+const FOUND: &str = "alias 7, operational\n";
+const MISSING: &str = "alias 7, not there\n";
+
+// covers: c-interface
+#[test]
+fn variables_of_a_program_with_links_of_its_own_are_switches() {
+    let Some(switches) = program(&here().join("tests/c/switches.c"), &[]) else { return };
+    let segment = segment("own");
+    let run = |variables: &[(&str, &str)], place| {
+        let mut command = Command::new(&switches);
+        said(command.env("RINGCAT_SIM", &segment).envs(variables.iter().copied()), place)
+    };
+    assert_eq!(run(&[], ["0", "1", "own", "own"]).as_deref(), Ok(FOUND));
+    for place in [["0", "1", ANY, ANY], ["0", "1", "own", ANY], ["7", "0", ANY, "own"]] {
+        assert_eq!(run(&[], place).as_deref(), Ok(MISSING), "{place:?}");
+        assert_eq!(run(&[("RINGCAT_WILDCARDS", "yes")], place).as_deref(), Ok(FOUND), "{place:?}");
+    }
+    let both = [("RINGCAT_WILDCARDS", "yes"), ("RINGCAT_REGALIAS", "yes"), ("RINGCAT_SII_ASSIGN", "yes")];
+    assert_eq!(run(&both, ["7", "0", ANY, ANY]).as_deref(), Ok(FOUND));
+    let wrong = run(&[("RINGCAT_REGALIAS", "1")], ["0", "1", ANY, ANY]).expect_err("the variable is wrong");
+    assert!(wrong.contains("RINGCAT_REGALIAS: expected yes or no, got \"1\""), "{wrong}");
+}
+
+// covers: c-interface, daemon
+#[test]
+fn a_program_has_the_settings_of_its_daemon() {
+    let Some(switches) = program(&here().join("tests/c/switches.c"), &[]) else { return };
+    let run = |bench: &Bench, switches: &Path, place| said(&mut bench.command(switches), place);
+    let (segment, mut settings) = (segment("daemon"), BusSettings::default());
+    let plain = Bench::start_with(&segment, "switches", settings.clone());
+    assert_eq!(run(&plain, &switches, ["7", "0", ANY, "own"]).as_deref(), Ok(MISSING));
+    settings.has_wildcards = true;
+    let wild = Bench::start_with(&segment, "wild", settings);
+    assert_eq!(run(&wild, &switches, ["7", "0", ANY, "own"]).as_deref(), Ok(FOUND));
+    // The variables of the program do not count beside a daemon.
+    let mut command = plain.command(&switches);
+    assert_eq!(said(command.env("RINGCAT_WILDCARDS", "yes"), ["7", "0", ANY, "own"]).as_deref(), Ok(MISSING));
+}

@@ -1,0 +1,366 @@
+//! The frames of the last seconds before a fault, as a capture file.
+//!
+//! In: the frames that [`Taps`] see, taken from them ten times a second by the thread of the bus log; events. Out:
+//! files for Wireshark (pcapng), and a line for the operator about each. Without a fault nothing is written. The
+//! cyclic path copies a frame into the queue of its tap, and does nothing else.
+
+use std::collections::BTreeMap;
+use std::fs::OpenOptions;
+use std::io::BufWriter;
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant, SystemTime};
+
+use ringcat_control::settings::DebugRing;
+use ringcat_engine::domain::DomainState;
+use ringcat_engine::event::Event;
+use ringcat_link::operator::Priority;
+use ringcat_link::recorder::{FrameReader, FrameRing};
+use ringcat_link::{AlreadyRead, Taps};
+
+/// Frames of this time behind a fault are in its file.
+const AFTER: Duration = Duration::from_millis(200);
+/// After a file faults cause no other one for this time.
+const PAUSE: Duration = Duration::from_secs(10);
+/// A domain that stays incomplete for this time is a fault, however many cycles that are.
+const INTERRUPTION: Duration = Duration::from_millis(100);
+/// Only the user of the process and its group read what was on the bus.
+const MODE: u32 = 0o640;
+/// What the interfaces are to the MainDevice.
+const DESCRIPTIONS: [&str; 2] = ["main link", "redundant link"];
+
+/// A line for the operator.
+type Line = (Priority, String);
+
+/// Why a file is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum RecordReason {
+    /// A SubDevice no longer answers.
+    Lost,
+    /// A SubDevice has left its state without a request.
+    StateLeft,
+    /// A domain was incomplete for too many cycles.
+    WorkingCounter,
+    /// An interface has lost its carrier.
+    LinkDown,
+    /// The daemon has taken the bus back.
+    TakenBack,
+    /// The application has ended without a release, or was stopped.
+    OwnerLost,
+    /// A command.
+    Command,
+}
+
+impl RecordReason {
+    /// In the name of a file.
+    const fn word(self) -> &'static str {
+        match self {
+            RecordReason::Lost => "lost",
+            RecordReason::StateLeft => "state-left",
+            RecordReason::WorkingCounter => "working-counter",
+            RecordReason::LinkDown => "link-down",
+            RecordReason::TakenBack => "taken-back",
+            RecordReason::OwnerLost => "owner-lost",
+            RecordReason::Command => "command",
+        }
+    }
+}
+
+/// What is known of the working counter of a domain.
+#[derive(Clone, Copy, Debug, Default)]
+struct Counted {
+    was_complete: bool,
+    incomplete_since: Option<Instant>,
+}
+
+/// A recording of the last seconds that goes on until it is dropped.
+#[derive(Debug)]
+pub struct FrameRecord {
+    reader: FrameReader,
+    ring: FrameRing,
+    settings: DebugRing,
+    master: u32,
+    names: Vec<String>,
+    domains: BTreeMap<usize, Counted>,
+    /// A fault, and when its file is written.
+    due: Option<(RecordReason, Instant)>,
+    written_at: Option<Instant>,
+    writing: Option<JoinHandle<Line>>,
+}
+
+impl FrameRecord {
+    /// Begins to record what these taps see of interfaces with these names.
+    ///
+    /// # Errors
+    /// Something else reads the taps.
+    pub fn start(
+        taps: &Taps,
+        master: u32,
+        names: Vec<String>,
+        settings: DebugRing,
+    ) -> Result<FrameRecord, AlreadyRead> {
+        let reader = taps.read()?;
+        let ring = FrameRing::new(settings.bytes as usize, Duration::from_secs(settings.seconds.into()));
+        let (domains, due, written_at, writing) = (BTreeMap::new(), None, None, None);
+        Ok(FrameRecord { reader, ring, settings, master, names, domains, due, written_at, writing })
+    }
+
+    /// Takes the frames that have waited.
+    pub(super) fn take_frames(&mut self) {
+        let ring = &mut self.ring;
+        let taken: Result<(), std::convert::Infallible> = self.reader.read(|note, frame| {
+            ring.push(note, frame);
+            Ok(())
+        });
+        match taken {
+            Ok(()) => {}
+        }
+    }
+
+    /// A file is written soon, unless one was written a moment ago; a command is followed in any case.
+    pub fn note(&mut self, reason: RecordReason, now: Instant) {
+        let is_soon = self.written_at.is_some_and(|at| now.duration_since(at) < PAUSE);
+        if self.due.is_none() && (reason == RecordReason::Command || !is_soon) {
+            self.due = Some((reason, now + AFTER));
+        }
+    }
+
+    /// Takes an event.
+    pub(super) fn take(&mut self, event: &Event, now: Instant) {
+        match event {
+            Event::Lost { .. } => self.note(RecordReason::Lost, now),
+            Event::StateError { requested: None, .. } => self.note(RecordReason::StateLeft, now),
+            Event::LinkDown { .. } => self.note(RecordReason::LinkDown, now),
+            Event::Domain { domain, status, incomplete } => {
+                let counted = self.domains.entry(domain.0).or_default();
+                let (was_complete, is_complete) = (counted.was_complete, status.state == DomainState::Complete);
+                counted.was_complete |= is_complete;
+                counted.incomplete_since = (was_complete && !is_complete).then_some(now);
+                if was_complete && *incomplete >= self.settings.cycles.into() {
+                    self.note(RecordReason::WorkingCounter, now);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Ten times a second: a file is written in a thread of its own if one is due. Lines about those that are written.
+    pub(super) fn look(&mut self, now: Instant, has_application: bool) -> Vec<Line> {
+        if !has_application {
+            self.domains.clear();
+        }
+        let is_long = |it: &Counted| it.incomplete_since.is_some_and(|since| now.duration_since(since) >= INTERRUPTION);
+        if self.domains.values().any(is_long) {
+            self.domains.values_mut().for_each(|it| it.incomplete_since = None);
+            self.note(RecordReason::WorkingCounter, now);
+        }
+        let mut lines = Vec::new();
+        if self.writing.as_ref().is_some_and(JoinHandle::is_finished) {
+            lines.extend(self.wait());
+        }
+        match self.due {
+            Some((reason, at)) if at <= now && self.writing.is_none() => {
+                self.due = None;
+                self.written_at = Some(now);
+                lines.extend(self.write(reason));
+            }
+            _ => {}
+        }
+        lines
+    }
+
+    /// The end: what is due is written.
+    pub(super) fn end(&mut self, now: Instant) -> Vec<Line> {
+        let mut lines: Vec<Line> = self.wait().into_iter().collect();
+        if let Some((reason, _)) = self.due.take() {
+            self.written_at = Some(now);
+            lines.extend(self.write(reason));
+        }
+        lines.extend(self.wait());
+        lines
+    }
+
+    /// Waits for the thread that writes.
+    fn wait(&mut self) -> Option<Line> {
+        // The panic handler has reported a panic of the thread.
+        self.writing.take()?.join().ok()
+    }
+
+    /// Writes in a thread of its own; the line that there is none.
+    fn write(&mut self, reason: RecordReason) -> Option<Line> {
+        let ring = self.ring.take();
+        let (master, names, settings) = (self.master, self.names.clone(), self.settings.clone());
+        let lost: u64 = (0..names.len()).map(|interface| self.reader.lost(interface)).sum();
+        let body = move || {
+            let names: Vec<(&str, &str)> = names.iter().map(String::as_str).zip(DESCRIPTIONS).collect();
+            match save(&ring, (master, reason), &names, &settings) {
+                Ok(path) => {
+                    let lacking =
+                        if lost == 0 { String::new() } else { format!(", {lost} since the start are not recorded") };
+                    let text = format!("The last {} frames are in {}{lacking}.", ring.len(), path.display());
+                    (Priority::Warning, text)
+                }
+                Err(error) => {
+                    let place = settings.directory.display();
+                    (Priority::Error, format!("The last frames cannot be written in {place}: {error}."))
+                }
+            }
+        };
+        match std::thread::Builder::new().name("record".into()).spawn(body) {
+            Ok(writing) => {
+                self.writing = Some(writing);
+                None
+            }
+            Err(error) => Some((Priority::Error, format!("The last frames cannot be written: {error}."))),
+        }
+    }
+}
+
+/// Writes the frames into a new file, after old files have made room for it.
+fn save(
+    ring: &FrameRing,
+    (master, reason): (u32, RecordReason),
+    names: &[(&str, &str)],
+    settings: &DebugRing,
+) -> std::io::Result<PathBuf> {
+    let begin = format!("ringcat-{master}-");
+    make_room(&settings.directory, &begin, settings.files)?;
+    // A clock before 1970 was never set.
+    let at_ms = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |at| at.as_millis());
+    let path = settings.directory.join(format!("{begin}{at_ms:013}-{}.pcapng", reason.word()));
+    let file = OpenOptions::new().write(true).create_new(true).mode(MODE).open(&path)?;
+    ring.write(BufWriter::with_capacity(1 << 18, file), names)?;
+    Ok(path)
+}
+
+/// Removes the oldest files of this master, so that with another one there are at most `most`.
+fn make_room(directory: &Path, begin: &str, most: u32) -> std::io::Result<()> {
+    let mut old: Vec<PathBuf> = Vec::new();
+    for entry in std::fs::read_dir(directory)? {
+        let entry = entry?;
+        let name = entry.file_name();
+        let is_ours = name.to_str().is_some_and(|it| it.starts_with(begin) && it.ends_with(".pcapng"));
+        if is_ours && entry.file_type()?.is_file() {
+            old.push(entry.path());
+        }
+    }
+    old.sort_unstable();
+    let surplus = (old.len() + 1).saturating_sub(most as usize);
+    old.iter().take(surplus).try_for_each(std::fs::remove_file)
+}
+
+#[cfg(test)]
+mod tests {
+    use ringcat_engine::declared::SubDeviceId;
+    use ringcat_engine::domain::{DomainId, DomainStatus};
+    use ringcat_link::pcapng::Direction;
+
+    use super::*;
+
+    struct Place(PathBuf);
+
+    impl Place {
+        fn new(name: &str) -> Place {
+            let path = std::env::temp_dir().join(format!("ringcat-record-{name}-{}", std::process::id()));
+            std::fs::create_dir_all(&path).expect("it can be made");
+            Place(path)
+        }
+
+        fn files(&self) -> Vec<String> {
+            let entries = std::fs::read_dir(&self.0).expect("it is there").flatten();
+            let mut names: Vec<String> = entries.filter_map(|it| it.file_name().into_string().ok()).collect();
+            names.sort_unstable();
+            names
+        }
+
+        fn record(&self, taps: &Taps, files: u32) -> FrameRecord {
+            let mut settings = DebugRing::default();
+            (settings.directory, settings.files, settings.cycles) = (self.0.clone(), files, 10);
+            FrameRecord::start(taps, 0, vec!["eth1".to_owned()], settings).expect("nothing else reads")
+        }
+    }
+
+    impl Drop for Place {
+        fn drop(&mut self) {
+            // It is below the directory for temporary files.
+            let _ = std::fs::remove_dir_all(&self.0);
+        }
+    }
+
+    fn domain(state: DomainState, incomplete: u64) -> Event {
+        let mut status = DomainStatus::default();
+        status.state = state;
+        Event::Domain { domain: DomainId(0), status, incomplete }
+    }
+
+    // covers: daemon, capture
+    #[test]
+    fn a_fault_writes_the_frames_before_it_and_shortly_after_it() {
+        let place = Place::new("fault");
+        let taps = Taps::new(1);
+        let (mut tap, mut record) = (taps.tap_with(1 << 16), place.record(&taps, 5));
+        let begin = Instant::now();
+        tap.record(0, Direction::Out, 1_000, &[0x11; 60]);
+        record.take_frames();
+        record.take_frames();
+        record.take(&Event::Lost { subdevice: SubDeviceId(0) }, begin);
+        assert_eq!(record.look(begin, true), []);
+        tap.record(0, Direction::In, 2_000, &[0x22; 60]);
+        record.take_frames();
+        record.take_frames();
+        assert_eq!((record.look(begin + AFTER, true), place.files().len()), (Vec::new(), 0));
+        let lines = record.end(begin + AFTER);
+        let [(_, text)] = &lines[..] else { panic!("{lines:?}") };
+        let [file] = &place.files()[..] else { panic!("{:?}", place.files()) };
+        assert!(text.contains("The last 2 frames are in ") && text.contains(file.as_str()), "{text}");
+        assert!(file.starts_with("ringcat-0-") && file.ends_with("-lost.pcapng"), "{file}");
+        let bytes = std::fs::read(place.0.join(file)).expect("it can be read");
+        assert!([[0x11; 60], [0x22; 60]].iter().all(|frame| bytes.windows(60).any(|it| it == frame)));
+    }
+
+    // covers: daemon, capture
+    #[test]
+    fn an_interruption_counts_by_cycles_or_time_and_only_after_a_complete_cycle() {
+        let place = Place::new("cycles");
+        let taps = Taps::new(1);
+        let begin = Instant::now();
+        let due = |events: &[Event], later: Duration| {
+            let mut record = place.record(&taps, 5);
+            events.iter().for_each(|event| record.take(event, begin));
+            record.look(begin + later, true);
+            record.due.map(|(reason, _)| reason)
+        };
+        let complete = domain(DomainState::Complete, 0);
+        let broken = domain(DomainState::Incomplete, 1);
+        let late = INTERRUPTION;
+        assert_eq!(due(&[broken.clone()], late), None, "before the first complete cycle");
+        assert_eq!(due(&[complete.clone(), broken.clone()], Duration::ZERO), None);
+        assert_eq!(due(&[complete.clone(), broken.clone()], late), Some(RecordReason::WorkingCounter));
+        let ended = |cycles| [complete.clone(), broken.clone(), domain(DomainState::Complete, cycles)];
+        assert_eq!(due(&ended(9), late), None);
+        assert_eq!(due(&ended(10), late), Some(RecordReason::WorkingCounter));
+    }
+
+    // covers: daemon, capture
+    #[test]
+    fn files_are_at_most_so_many_and_not_one_after_the_other() {
+        let place = Place::new("room");
+        std::fs::write(place.0.join("ringcat-01-other.pcapng"), []).expect("it can be written");
+        let taps = Taps::new(1);
+        let mut record = place.record(&taps, 2);
+        let mut now = Instant::now();
+        for round in 0..4 {
+            record.note(RecordReason::LinkDown, now);
+            assert_eq!(record.end(now).len(), 1, "{round}");
+            record.note(RecordReason::LinkDown, now + Duration::from_secs(1));
+            assert_eq!(record.due, None, "a moment after a file");
+            record.note(RecordReason::Command, now + Duration::from_secs(1));
+            assert_eq!(record.due.take().map(|(reason, _)| reason), Some(RecordReason::Command));
+            now += PAUSE;
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        assert_eq!(place.files().len(), 3, "two, and one that is not ours: {:?}", place.files());
+    }
+}
