@@ -6,6 +6,7 @@ use ringcat_wire::master_frame::{Phase, Stage, header_of_frame};
 use super::Exchange;
 use super::partner::{Difference, Items};
 use super::state::{Offers, State};
+use crate::board::Board;
 use crate::event::CyclicStandbyEvent;
 use crate::exchange::Received;
 use crate::exchange::flight::Step;
@@ -33,7 +34,7 @@ impl Exchange {
                 self.tally.disturbed().lost += lost;
                 self.board.post_lost(self.tally.counters.lost);
             }
-            state.evaluate(&mut self.events);
+            state.evaluate(&self.board, &mut self.events);
         }
         let header = &mut state.frames.header;
         header.first = before.next().number();
@@ -125,8 +126,19 @@ impl Exchange {
 
 impl State {
     /// Evaluates what the last cycle has brought back.
-    fn evaluate(&mut self, events: &mut Producer) {
+    fn evaluate(&mut self, board: &Board, events: &mut Producer) {
         let returned = self.frames.returned();
+        let own = self.frames.header.least;
+        match returned.answer {
+            Some(answer) => {
+                let found = (answer.version < own).then_some((answer.version, own));
+                self.report_version(found, events);
+            }
+            None if returned.unreadable.is_some() => {
+                self.report_version(returned.unreadable, events);
+            }
+            None => {}
+        }
         if let Some(partner) = self.watch.note(&returned) {
             events.push(CyclicStandbyEvent::Partner(partner).pack());
         }
@@ -136,6 +148,18 @@ impl State {
         if self.frames.header.phase == Phase::Offers {
             self.offer(&returned, events);
         }
+        self.post_readiness(self.reasons_of_active(board), events);
+    }
+
+    /// `found`: version of the other MainDevice, and the oldest one that could read the newer of both; `None` if each
+    /// reads the other. A version that was found is reported once; true if there is one.
+    pub(super) fn report_version(&mut self, found: Option<(u8, u8)>, events: &mut Producer) -> bool {
+        let version = found.map(|(got, _)| got);
+        let is_new = core::mem::replace(&mut self.other_version, version) != version;
+        if let Some((got, least)) = found.filter(|_| is_new) {
+            events.push(CyclicStandbyEvent::OtherVersion { got, least }.pack());
+        }
+        found.is_some()
     }
 
     /// The role is offered: the next cycle is the last one if the other MainDevice takes it.
