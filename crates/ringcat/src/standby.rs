@@ -21,6 +21,8 @@ pub mod guard;
 mod interface;
 mod joining;
 pub(crate) mod policy;
+#[cfg(feature = "daemon")]
+pub mod remote;
 mod roles;
 
 use std::error::Error;
