@@ -1,6 +1,7 @@
 //! Remote access to one of two MainDevices (protocol AC-08, REQ037): messages over TCP.
 //!
-//! A header of 12 bytes, then CBOR (RFC 8949): the magic `RCRA`, the version, two zero bytes, the length, little endian.
+//! A header of 12 bytes, then CBOR (RFC 8949): the magic `RCRA`, the version, two zero bytes, the length, little
+//! endian.
 //! A client sends [`RemoteQuery::Hello`] with the token, then one query after the other; each has one answer. Any bytes
 //! are allowed: decoding never panics, and takes no more memory than a small multiple of the limit.
 

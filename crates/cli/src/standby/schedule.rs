@@ -1,8 +1,8 @@
 //! Switchovers on a schedule, as proof that the other controller can take over (`--switch-every`).
 //!
-//! In: the time, the role, whether a failure of one controller is survived now, and why a request was refused. Out:
-//! what is to be done or said. The ACTIVE hands its role over; the new ACTIVE, with the same option, hands it back in its
-//! turn.
+//! In: the time, the role, whether a failure of one controller is survived now, and why a request was refused.
+//! Out: what is to be done or said. The ACTIVE hands its role over; the new ACTIVE, with the same option, hands it back
+//! in its turn.
 
 use std::time::Duration;
 

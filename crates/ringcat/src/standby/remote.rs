@@ -3,7 +3,8 @@
 //!
 //! [`RemoteServer`] answers clients in a thread of its own, which never touches the cycles: it reads what other threads
 //! publish, and asks the thread of the acyclic half. [`RemoteClient`] asks. Both need the same [`RemoteToken`]. The
-//! messages are not encrypted: over a network that others use, forward the port through SSH. Needs the feature `daemon`.
+//! messages are not encrypted: over a network that others use, forward the port through SSH. Needs the feature
+//! `daemon`.
 
 mod client;
 mod connection;

@@ -32,8 +32,8 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     }
 
     /// Whether a failure of one MainDevice would now cost no more than the time-out of a takeover
-    /// ([`NotReady::NOTHING`]), or why not, as of the last cycle. [`RoleControl::readiness`] is the same for any thread,
-    /// [`StandbyEvent::Readiness`](super::StandbyEvent) reports changes.
+    /// ([`NotReady::NOTHING`]), or why not, as of the last cycle. [`RoleControl::readiness`] is the same for any
+    /// thread, [`StandbyEvent::Readiness`](super::StandbyEvent) reports changes.
     pub fn takeover_readiness(&self) -> NotReady {
         self.role_control().map_or(NotReady::ABSENT, |control| control.readiness())
     }

@@ -1,5 +1,5 @@
-//! Remote access over TCP to two MainDevices of the library, whose halves have threads of their own, in real time: state
-//! of both, roles, permanent standby (protocol AC-08, REQ037); and hostile clients.
+//! Remote access over TCP to two MainDevices of the library, whose halves have threads of their own, in real time:
+//! state of both, roles, permanent standby (protocol AC-08, REQ037); and hostile clients.
 
 use std::io::{Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
@@ -142,7 +142,7 @@ fn a_client_without_the_token_gets_nothing_and_does_not_keep_others_out() {
     let supervisor = alone();
     let server = serve(&supervisor, RemoteOptions::default().with_clients(3));
     let mut admitted = client(&server);
-    let wrong = RemoteToken::new("a-token-of-nobody-x").expect("it is long enough");
+    let wrong = RemoteToken::new("a-token-of-others-x").expect("it is long enough");
     let refused = RemoteClient::connect(server.address(), &wrong, LIMIT).expect_err("it is refused");
     assert!(matches!(&refused, RemoteError::Refused(why) if why == "another token"), "{refused}");
     // A query before the token.

@@ -56,7 +56,7 @@ fn controllers_switch_on_schedule_and_are_asked_and_switched_over_tcp() {
         assert!(output.status.success(), "{more:?}: {text}{errors}");
         Page::read().check("remote", &text)
     };
-    // Alone it has nobody to hand its role over to, which it reports.
+    // Alone it has no other one to hand its role over to, which it reports.
     await_words(&second, "switchover on schedule: handed over within ");
     let handed_back = "switchover on schedule: handed over within ";
     await_that("it was handed over by both", &[&first, &second], || first.said().so_far().contains(handed_back));

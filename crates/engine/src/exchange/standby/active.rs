@@ -1,7 +1,7 @@
 //! The exchange of the ACTIVE: master frames out and back, and frames of others.
 
 use ringcat_wire::frame::MacAddress;
-use ringcat_wire::master_frame::{Phase, Stage, header_of_frame};
+use ringcat_wire::master_frame::{NotReady, Phase, Stage, header_of_frame};
 
 use super::Exchange;
 use super::partner::{Difference, Items};
@@ -196,6 +196,31 @@ impl State {
         if self.frames.header.phase == Phase::Offers {
             self.frames.header.phase = Phase::Goes;
         }
+    }
+}
+
+impl State {
+    /// Posts the reasons of this cycle, and reports them when they have changed.
+    pub(super) fn post_readiness(&mut self, reasons: NotReady, events: &mut Producer) {
+        self.control.post_readiness(reasons);
+        if let Some(reasons) = self.readiness.note(reasons) {
+            events.push(CyclicStandbyEvent::Readiness(reasons).pack());
+        }
+    }
+
+    /// The reasons that the ACTIVE knows: its own, and those of the other MainDevice.
+    pub(super) fn reasons_of_active(&self, board: &Board) -> NotReady {
+        let is_down = |link: &Link| board.live.carrier(*link) == Some(false);
+        // A MainDevice that is to stay INACTIVE may be ACTIVE on request: its own role is no reason.
+        let own = NotReady(self.control.not_ready()).with(NotReady::HELD, false);
+        let own = own.with(NotReady::LINK, Link::ALL.iter().any(is_down) || own.has(NotReady::LINK));
+        let own = own.with(NotReady::VERSION, self.other_version.is_some());
+        let of_other = match self.watch.partner() {
+            Partner::Absent => NotReady::ABSENT,
+            Partner::Forwards => NotReady::NO_ANSWER,
+            Partner::Alive { not_ready, .. } => not_ready,
+        };
+        NotReady(own.0 | of_other.0)
     }
 }
 

@@ -3,13 +3,6 @@
 
 use ringcat_wire::master_frame::NotReady;
 
-use super::state::State;
-use crate::board::Board;
-use crate::event::CyclicStandbyEvent;
-use crate::link::Link;
-use crate::queue::Producer;
-use crate::role::Partner;
-
 /// Cycles with the same reasons before they are reported: a lost frame and a change of the role are over by then.
 const SAME_FOR: u8 = 4;
 
@@ -32,31 +25,6 @@ impl ReadinessWatch {
             self.reported = Some(reasons);
             reasons
         })
-    }
-}
-
-impl State {
-    /// Posts the reasons of this cycle, and reports them when they have changed.
-    pub(super) fn post_readiness(&mut self, reasons: NotReady, events: &mut Producer) {
-        self.control.post_readiness(reasons);
-        if let Some(reasons) = self.readiness.note(reasons) {
-            events.push(CyclicStandbyEvent::Readiness(reasons).pack());
-        }
-    }
-
-    /// The reasons that the ACTIVE knows: its own, and those of the other MainDevice.
-    pub(super) fn reasons_of_active(&self, board: &Board) -> NotReady {
-        let is_down = |link: &Link| board.live.carrier(*link) == Some(false);
-        // A MainDevice that is to stay INACTIVE may be ACTIVE on request: its own role is no reason.
-        let own = NotReady(self.control.not_ready()).with(NotReady::HELD, false);
-        let own = own.with(NotReady::LINK, Link::ALL.iter().any(is_down) || own.has(NotReady::LINK));
-        let own = own.with(NotReady::VERSION, self.other_version.is_some());
-        let of_other = match self.watch.partner() {
-            Partner::Absent => NotReady::ABSENT,
-            Partner::Forwards => NotReady::NO_ANSWER,
-            Partner::Alive { not_ready, .. } => not_ready,
-        };
-        NotReady(own.0 | of_other.0)
     }
 }
 

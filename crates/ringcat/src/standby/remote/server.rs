@@ -141,7 +141,7 @@ impl Clients {
         for _ in 0..self.options.clients {
             let stream = match self.listener.accept() {
                 Ok((stream, _)) => stream,
-                // Nobody, or one that has ended already.
+                // None, or one that has ended already.
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => return,
                 Err(_) => continue,
             };
