@@ -17,6 +17,8 @@ pub mod esi;
 mod keys;
 pub mod line;
 pub mod network;
+#[cfg(feature = "standby")]
+pub mod remote;
 pub mod ring;
 pub mod run;
 pub mod scan;

@@ -145,6 +145,11 @@ enum Command {
     #[cfg(feature = "standby")]
     #[command(hide = true)]
     StandbyGuard(standby::guarding::GuardArguments),
+    /// Asks a `ringcat standby --remote` for its state, or for another role
+    ///
+    /// It waits until a request has taken effect.
+    #[cfg(feature = "standby")]
+    Remote(standby::remote::ClientArguments),
     /// Puts a simulated segment on network interfaces
     ///
     /// Any EtherCAT MainDevice at their other end can work with it.
@@ -192,6 +197,8 @@ fn main() -> ExitCode {
         Command::Standby(arguments) => standby::run(&arguments),
         #[cfg(feature = "standby")]
         Command::StandbyGuard(arguments) => return standby::guarding::run(&arguments),
+        #[cfg(feature = "standby")]
+        Command::Remote(arguments) => standby::remote::run(&arguments),
         Command::Sim(arguments) => sim::run(&arguments),
         Command::Eni(arguments) => eni_summary::run(&arguments),
         Command::Esi(arguments) => esi::run(&arguments),
@@ -219,6 +226,8 @@ impl Command {
             Command::Standby(_) => "standby",
             #[cfg(feature = "standby")]
             Command::StandbyGuard(_) => "standby-guard",
+            #[cfg(feature = "standby")]
+            Command::Remote(_) => "remote",
             Command::Sim(_) => "sim",
             Command::Eni(arguments) => arguments.name(),
             Command::Esi(arguments) => arguments.name(),

@@ -13,6 +13,8 @@ mod event_report;
 pub mod guarding;
 mod joining;
 mod options;
+pub mod remote;
+mod schedule;
 mod takeover;
 
 use std::time::Duration;
@@ -146,7 +148,7 @@ impl Activity {
 #[cfg(test)]
 mod tests {
     use clap::Parser;
-    use ringcat::standby::MAX_AGE;
+    use ringcat::standby::{MAX_AGE, MasterSizes};
 
     use super::*;
 
@@ -178,6 +180,23 @@ mod tests {
             let line = Line::try_parse_from(["standby", "--main", "a", "--redundant", "b", option]);
             let refused = run(&line.expect("it is complete").standby).expect_err("it is refused").to_string();
             assert!(refused.starts_with("clocks need a declaration"), "{option}: {refused}");
+        }
+    }
+
+    // covers: standby, REQ009
+    #[test]
+    fn options_for_the_sizes_of_master_frames_are_those_of_the_library() {
+        let sizes = |more: &[&str]| {
+            let line = ["standby", "--main", "a", "--redundant", "b", "--automatic"];
+            Line::try_parse_from(line.iter().chain(more)).map(|line| line.standby.sizes.sizes())
+        };
+        assert_eq!(sizes(&[]).ok(), Some(MasterSizes::default()));
+        let given = ["--master-out", "16", "--master-in", "8", "--no-update-in", "--knowledge", "256"];
+        let mut expected = MasterSizes::default();
+        (expected.to_inactive, expected.to_active, expected.inputs, expected.knowledge) = (16, 8, false, 256);
+        assert_eq!(sizes(&given).ok(), Some(expected));
+        for wrong in [["--knowledge", "0"], ["--knowledge", "1473"], ["--master-out", "65536"]] {
+            assert!(sizes(&wrong).is_err(), "{wrong:?}");
         }
     }
 

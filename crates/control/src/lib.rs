@@ -8,6 +8,7 @@
 //! * [`wire`]: messages as bytes, and any bytes as a message or an error;
 //! * [`connection`]: messages and descriptors over a Unix socket;
 //! * [`arriving`]: a message of which a part has arrived;
+//! * [`remote`]: messages of one of two MainDevices for remote access, over TCP;
 //! * [`client`]: queries to a daemon; [`socket`]: where it listens.
 //!
 //! A client sends [`Content::Hello`], then queries. An application that drives a master sends [`Content::Take`] and
@@ -24,6 +25,7 @@ mod owner;
 mod receive_error;
 pub mod refusal;
 pub mod settings;
+pub mod remote;
 pub mod socket;
 pub mod tool;
 pub mod wire;

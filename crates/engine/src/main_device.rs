@@ -152,6 +152,9 @@ impl MainDevice {
         let undeclared = UndeclaredMailboxes::new(&supervisor.bus(), emergencies.clone());
         let segment = Segment::new(choices(&options));
         let segment = SharedSegment::idle(&supervisor.bus(), segment, cache.clone(), undeclared);
+        #[cfg(feature = "standby")]
+        let standby =
+            options.standby.map(|standby| standby::Standby::new(standby, &identity, (options.links(), &roles), now));
         let mut main_device = MainDevice {
             supervisor,
             activations: 0,
@@ -177,7 +180,7 @@ impl MainDevice {
             roles,
             role_followed: 0,
             #[cfg(feature = "standby")]
-            standby: options.standby.map(|standby| standby::Standby::new(standby, &identity, options.links(), now)),
+            standby,
             options,
         };
         main_device.start_reconciler();

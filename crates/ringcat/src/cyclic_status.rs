@@ -16,6 +16,8 @@ use crate::histogram::Histogram;
 use crate::no_domain::NoDomain;
 use crate::pace::{Pace, PaceNs};
 use crate::process_data::Rate;
+#[cfg(feature = "standby")]
+use crate::standby::ForwardingCounters;
 
 /// How far cycles are from their phase in the system time of the segment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,6 +48,8 @@ pub struct CyclicStatus {
     /// Source address of the last frame of another MainDevice, and the link it arrived on, plus one.
     foreign: AtomicU64,
     ring: AtomicU64,
+    #[cfg(feature = "standby")]
+    forwarded: [AtomicU64; ForwardingCounters::COUNT],
 }
 
 /// Bit of [`CyclicStatus::restart_histograms`].
@@ -88,7 +92,20 @@ impl CyclicStatus {
             wanted: AtomicU8::new(0),
             foreign: AtomicU64::new(0),
             ring: AtomicU64::new(0),
+            #[cfg(feature = "standby")]
+            forwarded: zeros(),
         }
+    }
+
+    /// Frames that the cyclic half has forwarded as INACTIVE.
+    #[cfg(feature = "standby")]
+    pub fn forwarded(&self) -> ForwardingCounters {
+        ForwardingCounters::from_words(load(&self.forwarded))
+    }
+
+    #[cfg(feature = "standby")]
+    pub(crate) fn publish_forwarded(&self, counters: &ForwardingCounters) {
+        store(&self.forwarded, &counters.to_words());
     }
 
     /// Counts and delays of the cycles.

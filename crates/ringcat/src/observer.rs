@@ -177,6 +177,12 @@ impl Observer {
         self.0.cyclic_status.pace()
     }
 
+    /// Figures of the cyclic thread.
+    #[cfg(all(feature = "standby", feature = "daemon"))]
+    pub(crate) fn cyclic_status(&self) -> &CyclicStatus {
+        &self.0.cyclic_status
+    }
+
     /// Process data of all SubDevices as their FMMUs map it.
     pub fn fmmus(&self) -> &[DomainFmmu] {
         &self.0.fmmus

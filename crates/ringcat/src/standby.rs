@@ -21,6 +21,8 @@ pub mod guard;
 mod interface;
 mod joining;
 pub(crate) mod policy;
+#[cfg(feature = "daemon")]
+pub mod remote;
 mod roles;
 
 use std::error::Error;
@@ -123,6 +125,37 @@ impl fmt::Display for NeedsTwoLinks {
 impl Error for NeedsTwoLinks {}
 
 impl ForwardingCounters {
+    /// Frames that were not forwarded, for any reason.
+    pub const fn not_forwarded(&self) -> u64 {
+        self.again + self.own + self.not_ethercat + self.too_old + self.no_link
+    }
+
+    /// Number of counters.
+    pub(crate) const COUNT: usize = 9;
+
+    /// The counters as words.
+    pub(crate) const fn to_words(self) -> [u64; Self::COUNT] {
+        let ForwardingCounters { on_main, on_redundant, sent_back, same_identity, again, own, .. } = self;
+        let ForwardingCounters { not_ethercat, too_old, no_link, .. } = self;
+        [on_main, on_redundant, sent_back, same_identity, again, own, not_ethercat, too_old, no_link]
+    }
+
+    /// The counters of [`ForwardingCounters::to_words`].
+    pub(crate) const fn from_words(words: [u64; Self::COUNT]) -> ForwardingCounters {
+        let [on_main, on_redundant, sent_back, same_identity, again, own, not_ethercat, too_old, no_link] = words;
+        ForwardingCounters {
+            on_main,
+            on_redundant,
+            sent_back,
+            same_identity,
+            again,
+            own,
+            not_ethercat,
+            too_old,
+            no_link,
+        }
+    }
+
     /// The error of a MainDevice that has received frames with its own identity from another one.
     pub const fn check_identity(&self) -> Result<(), SameIdentity> {
         if self.same_identity == 0 { Ok(()) } else { Err(SameIdentity) }

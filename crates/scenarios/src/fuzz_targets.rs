@@ -1,6 +1,6 @@
 //! Fuzz targets for arbitrary bytes: one per mailbox decoder (protocol 6, 10.1), and one each for ENI, ESI
 //! and network files (protocol 8, 12), for knowledge of a segment (decision 0061), for messages of the daemon (decision
-//! 0074), and for master frames (decision 0130).
+//! 0074) and of remote access (decision 0221), and for master frames (decision 0130).
 //!
 //! A target is a plain function. It panics if a decoder panics, or if a decoded value changes when it is encoded and
 //! decoded again. `fuzz/` runs the targets under cargo-fuzz, `cargo test` with the corpora in `fuzz/corpus` and mutants
@@ -12,6 +12,7 @@ pub mod esi;
 pub mod knowledge;
 pub mod master_frame;
 pub mod network;
+pub mod remote;
 pub mod seeds;
 
 use ringcat_wire::mailbox::aoe::{AdsRequest, AdsResponse, AmsHeader};
@@ -32,7 +33,7 @@ use crate::dice::Dice;
 pub type Target = fn(&[u8]);
 
 /// All targets by the names of their corpora.
-pub const TARGETS: [(&str, Target); 19] = [
+pub const TARGETS: [(&str, Target); 20] = [
     ("mailbox", mailbox),
     ("error_reply", error_reply),
     ("coe", coe),
@@ -51,6 +52,7 @@ pub const TARGETS: [(&str, Target); 19] = [
     ("network", network::target),
     ("knowledge", knowledge::target),
     ("control", control::target),
+    ("remote", remote::target),
     ("master_frame", master_frame::target),
 ];
 

@@ -12,6 +12,8 @@ use super::doctor::Doctor;
 use super::eni::{EniExport, EniFile};
 use super::esi::{EsiDeclared, EsiList, EsiShow};
 use super::network::{Compare, Init};
+#[cfg(feature = "standby")]
+use super::remote::Remote;
 use super::ring::Ring;
 use super::run::Run;
 use super::scan::Scan;
@@ -36,6 +38,8 @@ pub enum Data {
     Sim(Sim),
     #[cfg(feature = "standby")]
     Standby(Standby),
+    #[cfg(feature = "standby")]
+    Remote(Remote),
     Eni(Box<EniFile>),
     EniExport(EniExport),
     EsiList(EsiList),

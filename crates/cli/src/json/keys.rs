@@ -8,7 +8,8 @@ use std::path::Path;
 use json_keys::{Table, check_keys, check_page, keys};
 
 use super::{
-    bench, capture, clocks, demo, demo_standby, doctor, eni, esi, line, network, ring, run, scan, sii, sim, standby,
+    bench, capture, clocks, demo, demo_standby, doctor, eni, esi, line, network, remote, ring, run, scan, sii, sim,
+    standby,
 };
 
 /// The line before the tables.
@@ -30,6 +31,7 @@ fn all() -> Vec<Table> {
         ("`doctor`", keys::<doctor::Doctor>()),
         ("`capture`", keys::<capture::Capture>()),
         ("`standby`", keys::<standby::Standby>()),
+        ("`remote`", keys::<remote::Remote>()),
         ("`sim`", keys::<sim::Sim>()),
         ("`eni`", keys::<eni::EniFile>()),
         ("`eni export`", keys::<eni::EniExport>()),

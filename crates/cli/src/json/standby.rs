@@ -49,12 +49,28 @@ pub struct Takeover {
     pub alarms: u64,
     /// Differences of the configuration that were reported
     pub configuration_differences: u64,
+    /// Why a failure of one MainDevice would have cost more than a takeover, before the end; empty if ready
+    pub not_ready: Vec<&'static str>,
+    /// Switchovers on a schedule; null without `--switch-every`
+    pub switchovers: Option<Switchovers>,
     /// The other MainDevice was ready to take over at the end
     pub partner_ready: bool,
     /// The role was handed over at the end
     pub handed_over: bool,
     /// The bus was stopped at the end: outputs zero, all SubDevices in INIT
     pub stopped: bool,
+}
+
+/// Switchovers on a schedule.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Switchovers {
+    /// This MainDevice has handed its role over
+    pub done: u64,
+    /// It has not: not ready, or the other MainDevice did not take the role
+    pub refused: u64,
+    /// Longest time from the request to the end of the role, in nanoseconds; null before the first
+    pub longest_ns: Option<u64>,
 }
 
 impl From<&ForwardingCounters> for Standby {

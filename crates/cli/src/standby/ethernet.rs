@@ -1,5 +1,7 @@
 //! The network interface of `ringcat standby` that leads to the other MainDevice.
 
+use std::time::Duration;
+
 use clap::Args;
 use ringcat::standby::{PartnerInterface, PartnerTraffic};
 use ringcat::wire::frame::MacAddress;
@@ -9,6 +11,9 @@ use super::event_report::EventReport;
 use crate::failure::Failure;
 use crate::numbers::number;
 use crate::output::say;
+
+/// Pause before an interface that another program has removed is made again.
+const AGAIN: Duration = Duration::from_millis(500);
 
 /// Its options.
 #[derive(Args, Clone, Debug)]
@@ -35,23 +40,26 @@ impl EthernetArguments {
     /// Makes the interface.
     pub fn start(&self, supervisor: &SupervisorThread, main: MacAddress) -> Result<Option<Ethernet>, Failure> {
         let Some(name) = &self.tap else { return Ok(None) };
-        let made = supervisor.start_partner_interface(name, PartnerInterface::address(main));
+        let mac = PartnerInterface::address(main);
+        let made = supervisor.start_partner_interface(name, mac);
         let interface = made.map_err(|error| Failure::new(format!("--tap {name}: {error}")))?;
-        Ok(Some(Ethernet { name: name.clone(), interface, is_up: false, is_removed: false }))
+        Ok(Some(Ethernet { name: name.clone(), mac, interface, is_up: false, again_at: None }))
     }
 }
 
 /// The interface. It is removed when this is dropped.
 pub struct Ethernet {
     name: String,
+    mac: [u8; 6],
     interface: PartnerInterface,
     is_up: bool,
-    is_removed: bool,
+    /// Another program has removed it: it is made again then.
+    again_at: Option<Instant>,
 }
 
 impl Ethernet {
-    /// Prints what has changed.
-    pub fn report(&mut self, events: &EventReport, now: Instant) {
+    /// Prints what has changed. An interface that another program has removed is made again.
+    pub fn report(&mut self, supervisor: &SupervisorThread, events: &EventReport, now: Instant) {
         let (name, status) = (&self.name, self.interface.status());
         if std::mem::replace(&mut self.is_up, status.is_up) != status.is_up {
             events.say(
@@ -62,8 +70,20 @@ impl Ethernet {
                 },
             );
         }
-        if std::mem::replace(&mut self.is_removed, status.is_removed) != status.is_removed {
-            events.say(now, &format!("{name}: removed by another program"));
+        match self.again_at {
+            None if status.is_removed => {
+                events.say(now, &format!("{name}: removed by another program"));
+                self.again_at = Some(now + AGAIN);
+            }
+            Some(at) if now >= at => match supervisor.start_partner_interface(name, self.mac) {
+                Ok(interface) => {
+                    events.say(now, &format!("{name}: made again; it needs its IP address again"));
+                    (self.interface, self.again_at, self.is_up) = (interface, None, false);
+                }
+                // Its name may be taken for a moment.
+                Err(_) => self.again_at = Some(now + AGAIN),
+            },
+            _ => {}
         }
     }
 

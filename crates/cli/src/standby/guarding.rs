@@ -96,6 +96,11 @@ impl Guarded {
         Ok(Guarded { guard: Some(guard), limit, look_at: Instant::default(), fault: None })
     }
 
+    /// Whether this process is not guarded as it should be.
+    pub fn has_fault(&self) -> bool {
+        self.fault.is_some()
+    }
+
     /// How long this process may wait.
     pub fn look(&self) -> Duration {
         self.guard.as_ref().map_or(LOOK, Guard::beat_period).min(LOOK)

@@ -3,10 +3,11 @@
 use std::time::Duration;
 
 use clap::Args;
-use ringcat::standby::Policy;
+use ringcat::standby::{MasterSizes, Policy};
 
 use super::ethernet::EthernetArguments;
 use super::guarding;
+use super::remote::ServerArguments;
 use crate::interfaces::LinkNames;
 use crate::numbers::number;
 use crate::run::declared::DeclarationArguments;
@@ -59,6 +60,10 @@ pub struct StandbyArguments {
     pub policy: PolicyArguments,
     #[command(flatten)]
     pub ethernet: EthernetArguments,
+    #[command(flatten)]
+    pub remote: ServerArguments,
+    #[command(flatten)]
+    pub sizes: SizeArguments,
     /// Age from which frames are not forwarded
     ///
     /// Frames wait where this computer is too busy, or where this program was stopped. They would bring SubDevices back
@@ -112,12 +117,54 @@ pub struct PolicyArguments {
     /// Stay INACTIVE: neither take over, nor be handed the role over
     #[arg(long, requires = "declaration")]
     permanent_standby: bool,
+    /// Hand the role over each time this one has been ACTIVE for this time
+    ///
+    /// As proof that the other one can take over; with this option there as well, it hands the role back. A switchover
+    /// is refused and reported when not ready, and the exit status is then 1.
+    #[arg(long, value_name = "TIME", value_parser = time, requires = "declaration")]
+    #[arg(conflicts_with = "permanent_standby")]
+    pub switch_every: Option<Duration>,
     /// End if the watchdog of a SubDevice is too short for a takeover
     ///
     /// During a takeover, outputs may be missing for --timeout and two cycles: such a SubDevice then leaves OP. Without
     /// this option it is only reported.
     #[arg(long, requires = "declaration", conflicts_with = "permanent_standby")]
     pub strict: bool,
+}
+
+/// Sizes of master frames, the same on both controllers.
+#[derive(Args, Clone, Copy, Debug)]
+#[command(next_help_heading = "Master frames")]
+pub struct SizeArguments {
+    /// Bytes of process data of the ACTIVE for the INACTIVE
+    ///
+    /// Programs of the library use them; this one sends zeros.
+    #[arg(long, value_name = "BYTES", default_value = "0", requires = "declaration")]
+    master_out: u16,
+    /// Bytes of process data of the INACTIVE for the ACTIVE
+    #[arg(long, value_name = "BYTES", default_value = "0", requires = "declaration")]
+    master_in: u16,
+    /// Do not send the inputs of the SubDevices to the INACTIVE
+    ///
+    /// Its inputs are zero then until it takes over. Outputs need no room: it takes them from the process data.
+    #[arg(long, requires = "declaration")]
+    no_update_in: bool,
+    /// Bytes of knowledge of the segment per cycle
+    ///
+    /// The INACTIVE follows when it has all of it; fewer bytes make the master frames shorter.
+    #[arg(long, value_name = "BYTES", default_value = "512", value_parser = number(8_u16..=1472, 512))]
+    #[arg(requires = "declaration")]
+    knowledge: u16,
+}
+
+impl SizeArguments {
+    /// The sizes.
+    pub fn sizes(self) -> MasterSizes {
+        let mut sizes = MasterSizes::default();
+        (sizes.to_inactive, sizes.to_active) = (self.master_out, self.master_in);
+        (sizes.inputs, sizes.knowledge) = (!self.no_update_in, self.knowledge);
+        sizes
+    }
 }
 
 impl PolicyArguments {

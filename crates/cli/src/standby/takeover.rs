@@ -9,7 +9,8 @@ use std::thread::{JoinHandle, sleep};
 use std::time::Duration;
 
 use ringcat::packet::PacketLinks;
-use ringcat::standby::{RoleControl, RoleRequest, StandbyOptions};
+use ringcat::standby::remote::RemoteServer;
+use ringcat::standby::{NotReady, RoleControl, RoleRequest, StandbyOptions};
 use ringcat::{
     AlState, CyclicThread, Instant, LastOutputs, Links, MainDeviceRole, Options, SubDeviceState, SupervisorThread,
 };
@@ -22,6 +23,7 @@ use super::event_report::EventReport;
 use super::guarding::Guarded;
 use super::joining::{Joined, Joiner};
 use super::options::StandbyArguments;
+use super::schedule::{HAND_OVER_LIMIT, Schedule, Step};
 use crate::ending::EndRequest;
 use crate::failure::Failure;
 use crate::interfaces::now;
@@ -37,8 +39,6 @@ use crate::verdict::{Report, Verdict};
 const LOOK: Duration = Duration::from_millis(2);
 /// SubDevices have this long to get to INIT in the end.
 const STOP_LIMIT: Duration = Duration::from_secs(5);
-/// The other MainDevice has this long to take the role.
-const HAND_OVER_LIMIT: Duration = Duration::from_secs(1);
 /// The last events arrive within this time.
 const LAST_EVENTS: Duration = Duration::from_millis(30);
 /// A bus that is being brought up when the end comes is finished first, for this long at most: only then is it known
@@ -58,6 +58,10 @@ struct Controller<'a> {
     events: EventReport,
     /// The interface that leads to the other MainDevice.
     ethernet: Option<Ethernet>,
+    /// Remote access, until the end.
+    remote: Option<RemoteServer>,
+    /// Switchovers on a schedule.
+    schedule: Option<Schedule>,
 }
 
 /// Joins the ring, and runs cycles in the role that the policy gives.
@@ -86,18 +90,34 @@ pub fn run(arguments: &StandbyArguments) -> Result<Report, Failure> {
     let (cyclic, acyclic) = (beating(cyclic, Half::Cyclic), beating(acyclic, Half::Acyclic));
     let _awake = thread.prepare_process();
     let standby = StandbyOptions::default().with_max_acyclic(arguments.ethernet.max_acyclic());
+    let standby = standby.with_sizes(arguments.sizes.sizes());
     let options = Options::default().with_standby(standby).with_pdos(pdos(network.as_ref()));
     let supervisor = SupervisorThread::start(acyclic, &options, move || thread.prepare_supervisor())?;
     let ethernet = arguments.ethernet.start(&supervisor, main)?;
     let control = supervisor.role_control()?;
+    control.set_not_ready(NotReady::GUARD.0, arguments.no_guard);
+    let remote = arguments.remote.start(&supervisor)?;
+    let schedule = arguments.policy.switch_every.map(Schedule::new);
     // Nothing else sets it.
     let _ = beats.role.set(control.clone());
     let interfaces = [names.main.clone(), redundant.to_owned()];
     let begin = now();
     let until = arguments.lasts.map_or(Instant::NEVER, |lasts| begin + lasts);
     let events = EventReport::new(begin);
-    let controller =
-        Controller { arguments, end, until, supervisor, control, beats, guarded, interfaces, events, ethernet };
+    let controller = Controller {
+        arguments,
+        end,
+        until,
+        supervisor,
+        control,
+        beats,
+        guarded,
+        interfaces,
+        events,
+        ethernet,
+        remote,
+        schedule,
+    };
     controller.run(network.map(Arc::new), cyclic)
 }
 
@@ -138,6 +158,9 @@ impl Controller<'_> {
     fn is_over(&mut self) -> bool {
         self.guarded.note_acted(self.beats.has_acted.load(Ordering::Relaxed));
         self.guarded.check(now());
+        if self.guarded.has_fault() {
+            self.control.set_not_ready(NotReady::GUARD.0, true);
+        }
         self.end.is_asked() || now() >= self.until || self.beats.has_acted.load(Ordering::Relaxed)
     }
 
@@ -150,8 +173,22 @@ impl Controller<'_> {
     fn report_events(&mut self) {
         self.events.report(&self.supervisor, now());
         if let Some(ethernet) = &mut self.ethernet {
-            ethernet.report(&self.events, now());
+            ethernet.report(&self.supervisor, &self.events, now());
         }
+        let Some(schedule) = &mut self.schedule else { return };
+        let (role, readiness) = (self.control.role(), self.control.readiness());
+        let words = match schedule.step(now(), role, readiness, &mut self.events.refused) {
+            Some(Step::Request) => {
+                self.control.request(RoleRequest::HandOver);
+                "switchover on schedule: the role is offered".to_owned()
+            }
+            Some(Step::Done(time)) => {
+                format!("switchover on schedule: handed over within {:.3} ms", time.as_secs_f64() * 1e3)
+            }
+            Some(Step::Refused(why)) => format!("switchover on schedule REFUSED: {why}"),
+            None => return,
+        };
+        self.events.say(now(), &words);
     }
 
     /// Why it ends, in words.
@@ -222,8 +259,14 @@ impl Controller<'_> {
 
     /// Ends the cycles in order.
     fn finish(mut self, cycles: CyclicThread<HalfLinks>, ready: &AtomicBool) -> Result<Report, Failure> {
+        self.remote = None;
         self.events.report(&self.supervisor, now());
+        self.events.seen.not_ready = self.control.readiness().reasons().collect();
+        let switchovers = self.schedule.as_ref().map(Schedule::seen);
         let mut reasons: Vec<String> = self.end.cut_short(self.arguments.lasts).into_iter().collect();
+        let refused = switchovers.as_ref().map_or(0, |seen| seen.refused);
+        reasons.extend((refused > 0).then(|| format!("switchovers on schedule that were refused: {refused}")));
+        self.events.seen.switchovers = switchovers;
         let role = self.control.role();
         self.events.seen.partner_ready = role == MainDeviceRole::Active && ready.load(Ordering::Relaxed);
         let has_acted = self.beats.has_acted.load(Ordering::Relaxed);
@@ -287,7 +330,7 @@ impl Controller<'_> {
 
     fn report(mut self, reasons: Vec<String>, standby: &Standby, role: &'static str) -> Report {
         self.events.seen.role = role;
-        let seen = self.events.seen;
+        let seen = self.events.seen.clone();
         let end = match (role, seen.handed_over) {
             ("active", true) => "handed the role over",
             ("active", false) => "stopped the bus as ACTIVE",

@@ -151,7 +151,8 @@ fn the_output_of_each_command_on_the_page_is_checked_by_a_test() {
     let read = |path: &str| std::fs::read_to_string(format!("{root}{path}")).expect("the file is there");
     let tests = read("cli/tests/program/json.rs")
         + &read("cli/tests/program/doctor.rs")
-        + &read("scenarios/tests/on_the_wire/json.rs");
+        + &read("scenarios/tests/on_the_wire/json.rs")
+        + &read("scenarios/tests/on_the_wire/remote.rs");
     let page = read("../docs/json.md");
     let heading = |line: &str| Some(line.strip_prefix("### `")?.strip_suffix('`')?.to_owned());
     let commands: Vec<String> = page.lines().filter_map(heading).collect();
@@ -174,6 +175,7 @@ fn what_cannot_be_done_is_an_object_too() {
         "capture --main no-such --out /tmp/never.pcapng",
         "sim --main no-such --segment FILE",
         "standby --main no-such --redundant no-such-2",
+        "remote 127.0.0.1:1 --token FILE.missing",
         "init --main no-such --out /tmp/never.toml",
         "compare --main no-such --network FILE.missing",
         "eni FILE.xml",

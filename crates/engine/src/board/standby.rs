@@ -6,7 +6,7 @@
 use core::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, AtomicU64, Ordering};
 
 use ringcat_wire::frame::MacAddress;
-use ringcat_wire::master_frame::{Diagnosis, DomainRecord};
+use ringcat_wire::master_frame::{Diagnosis, DomainRecord, Header};
 use ringcat_wire::memory_write::MemoryWrite;
 
 use super::sheet::Sheet;
@@ -15,6 +15,8 @@ use crate::time::Instant;
 
 /// Room for the knowledge of a segment: some 300 SubDevices with their SIIs. More is not sent.
 pub const KNOWLEDGE_ROOM: usize = 256 * 1024;
+/// The ACTIVE goes on if its last cycle began at most this number of periods ago: less than any time-out (9.9).
+const GOES_ON: u64 = 3;
 /// Room for a diagnosis with this number of domains.
 const DOMAINS: usize = 64;
 
@@ -42,6 +44,9 @@ pub struct StandbyWords {
     session: AtomicU32,
     /// Digest of its configuration.
     identity: AtomicU64,
+    /// The write into the memory of a SubDevice that its last header named; 0 without one. It is under way until then.
+    partner_write: AtomicU16,
+    partner_writes_until: AtomicU64,
     /// The last [`Takeover`], as a number. Writer: the cyclic half.
     takeover: AtomicU8,
     /// When a frame of the other MainDevice came last while this one is INACTIVE; 0 before. Writers: both halves.
@@ -67,6 +72,8 @@ impl Default for StandbyWords {
             diagnosis: Sheet::new(Diagnosis::LEN + DOMAINS * DomainRecord::LEN),
             session: AtomicU32::new(0),
             identity: AtomicU64::new(0),
+            partner_write: AtomicU16::new(0),
+            partner_writes_until: AtomicU64::new(0),
             takeover: AtomicU8::new(0),
             partner_frame_at: AtomicU64::new(0),
             other_version: AtomicU32::new(0),
@@ -78,9 +85,17 @@ impl Default for StandbyWords {
 
 impl StandbyWords {
     /// Posts a header of the other MainDevice.
-    pub fn post_header(&self, session: u16, identity: u64) {
-        self.identity.store(identity, Ordering::Relaxed);
-        self.session.store(u32::from(session) + 1, Ordering::Release);
+    pub fn post_header(&self, header: &Header, now: Instant) {
+        self.partner_write.store(header.write.map_or(0, MemoryWrite::code), Ordering::Relaxed);
+        self.partner_writes_until.store(now.0 + u64::from(header.period_ns) * GOES_ON, Ordering::Relaxed);
+        self.identity.store(header.identity, Ordering::Relaxed);
+        self.session.store(u32::from(header.session) + 1, Ordering::Release);
+    }
+
+    /// The write into the memory of a SubDevice that the ACTIVE does, if its last cycle has just come.
+    pub fn partner_write(&self, now: Instant) -> Option<MemoryWrite> {
+        let goes_on = now.0 < self.partner_writes_until.load(Ordering::Relaxed);
+        MemoryWrite::from_code(self.partner_write.load(Ordering::Relaxed)).filter(|_| goes_on)
     }
 
     /// Posts what this MainDevice goes on with as ACTIVE.

@@ -52,11 +52,12 @@ pub enum StandbyEvent {
         /// What differs.
         what: String,
     },
-    /// The other MainDevice has master frames of a version that this one cannot read.
+    /// One of both MainDevices has master frames of a version that the other one cannot read: none can take over for
+    /// the other. Reported on both sides.
     OtherVersion {
-        /// Its version.
+        /// Version of the other MainDevice.
         got: u8,
-        /// The oldest version that could read it.
+        /// The oldest version that could read the newer one of both.
         least: u8,
     },
     /// The role was to be handed over, and the other MainDevice does not take it.
@@ -75,6 +76,10 @@ pub enum StandbyEvent {
     },
     /// After [`StandbyEvent::NoActive`]: an ACTIVE sends process data again.
     ActiveIsBack,
+    /// Whether a failure of one MainDevice would now cost no more than the time-out of a takeover: no reasons
+    /// ([`NotReady::NOTHING`]), or why not ([`RoleControl::readiness`](crate::role::RoleControl::readiness)). Reported
+    /// on both sides when it has changed, and has been the same for four cycles.
+    Readiness(NotReady),
     /// The declared watchdog of a SubDevice with outputs is not longer than the time for which process data may be
     /// missing in a takeover: the SubDevice then leaves OP. Reported once when the policy is set.
     WatchdogTooShort {
@@ -106,6 +111,7 @@ const KIND_REFUSED: u64 = 0x17;
 const KIND_KEPT: u64 = 0x18;
 const KIND_NO_ACTIVE: u64 = 0x19;
 const KIND_BACK: u64 = 0x1A;
+const KIND_READINESS: u64 = 0x1B;
 
 /// An event of the exchange, which is packed into words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -156,6 +162,8 @@ pub enum CyclicStandbyEvent {
     NoActive(Duration),
     /// See [`StandbyEvent::ActiveIsBack`].
     ActiveIsBack,
+    /// See [`StandbyEvent::Readiness`].
+    Readiness(NotReady),
 }
 
 impl CyclicStandbyEvent {
@@ -198,6 +206,7 @@ impl CyclicStandbyEvent {
             CyclicStandbyEvent::RoleRefused(write) => [KIND_KEPT | (write.code() as u64) << 16, 0, 0],
             CyclicStandbyEvent::NoActive(silence) => [KIND_NO_ACTIVE, silence.as_nanos() as u64, 0],
             CyclicStandbyEvent::ActiveIsBack => [KIND_BACK, 0, 0],
+            CyclicStandbyEvent::Readiness(reasons) => [KIND_READINESS | (reasons.0 as u64) << 16, 0, 0],
         }
     }
 
@@ -237,6 +246,7 @@ impl CyclicStandbyEvent {
             },
             KIND_NO_ACTIVE => Some(CyclicStandbyEvent::NoActive(Duration::from_nanos(words[1]))),
             KIND_BACK => Some(CyclicStandbyEvent::ActiveIsBack),
+            KIND_READINESS => Some(CyclicStandbyEvent::Readiness(NotReady(half))),
             _ => None,
         }
     }
@@ -262,6 +272,7 @@ impl CyclicStandbyEvent {
             CyclicStandbyEvent::RoleRefused(write) => StandbyEvent::RoleRefused(write),
             CyclicStandbyEvent::NoActive(silence) => StandbyEvent::NoActive { silence },
             CyclicStandbyEvent::ActiveIsBack => StandbyEvent::ActiveIsBack,
+            CyclicStandbyEvent::Readiness(reasons) => StandbyEvent::Readiness(reasons),
         }
     }
 }
@@ -322,6 +333,7 @@ mod tests {
             CyclicStandbyEvent::RoleRefused(write),
             CyclicStandbyEvent::NoActive(Duration::from_nanos(0x1234_5678_9ABC)),
             CyclicStandbyEvent::ActiveIsBack,
+            CyclicStandbyEvent::Readiness(NotReady::ABSENT.with(NotReady::GUARD, true)),
         ];
         for event in events {
             assert_eq!(CyclicEvent::unpack(event.pack()), Some(CyclicEvent::Standby(event)));

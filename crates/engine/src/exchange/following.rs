@@ -190,7 +190,7 @@ impl Following {
             Area::Header => match Header::decode(fragment.data) {
                 Ok(header) => {
                     self.unusable = (header.lengths != self.lengths).then_some(Unusable::Lengths(header.lengths));
-                    self.words.post_header(header.session, header.identity);
+                    self.words.post_header(&header, now);
                     self.knowledge.expect(&header);
                     cycle.header = Some((header, sequence));
                     true

@@ -9,7 +9,7 @@ mod frame;
 use alloc::boxed::Box;
 use alloc::vec;
 
-use ringcat_wire::master_frame::{Answer, Area, Diagnosis, DomainRecord, Header, SubDeviceRecord};
+use ringcat_wire::master_frame::{Answer, Area, Diagnosis, DomainRecord, Header, MasterFrameError, SubDeviceRecord};
 
 use self::frame::MasterFrame;
 use super::domain::Domain;
@@ -42,6 +42,8 @@ pub(super) struct Returned {
     pub is_taken: bool,
     /// Its answer.
     pub answer: Option<Answer>,
+    /// Its answer is of a version that cannot be read: that version, and the oldest one that could.
+    pub unreadable: Option<(u8, u8)>,
 }
 
 /// Where the areas of the ACTIVE come from.
@@ -124,11 +126,15 @@ impl MasterFrames {
 
     /// What the last cycle has brought back so far.
     pub fn returned(&self) -> Returned {
-        let is_filled = self.filled.0 == self.filled.1;
+        let answer = (self.filled.0 == self.filled.1).then(|| Answer::decode(&self.answer));
         Returned {
             is_forwarded: self.frames.iter().any(MasterFrame::is_forwarded),
             is_taken: self.frames.iter().all(MasterFrame::is_taken),
-            answer: if is_filled { Answer::decode(&self.answer).ok() } else { None },
+            unreadable: match answer {
+                Some(Err(MasterFrameError::Version { least, got })) => Some((got, least)),
+                _ => None,
+            },
+            answer: answer.and_then(Result::ok),
         }
     }
 

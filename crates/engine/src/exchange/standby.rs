@@ -9,6 +9,7 @@ mod active;
 mod inactive;
 mod pace;
 mod partner;
+mod readiness;
 mod roles;
 pub mod state;
 
@@ -29,6 +30,7 @@ use crate::role::{MainDeviceRole, Partner, RoleControl};
 use crate::time::Instant;
 
 use partner::{Items, PartnerWatch};
+use readiness::ReadinessWatch;
 use state::{Offers, Standby, StandbySetup, State};
 
 impl Exchange {
@@ -55,6 +57,7 @@ impl Exchange {
             following,
             outputs: OutputsSeen::new(layout),
             watch: PartnerWatch::default(),
+            readiness: ReadinessWatch::default(),
             items,
             exchanges_from,
             yields_without_links: setup.yields_without_links,
@@ -113,6 +116,11 @@ impl Exchange {
     /// The role; ACTIVE without MainDevice redundancy.
     pub fn role(&self) -> MainDeviceRole {
         self.standby.0.as_ref().map_or(MainDeviceRole::Active, |state| state.role)
+    }
+
+    /// Whether a policy neither takes over nor accepts the role ([`RoleControl::hold`]).
+    pub fn is_held(&self) -> bool {
+        self.standby.0.as_ref().is_some_and(|state| state.control.is_held())
     }
 
     /// State of the other MainDevice, as determined by the ACTIVE.

@@ -18,6 +18,7 @@ use crate::board::standby::StandbyWords;
 use crate::event::{CyclicEvent, Event};
 use crate::link::LinkSet;
 use crate::ring::Identity;
+use crate::role::RoleControl;
 use crate::standby::PartnerEndpoint;
 use crate::standby::ethernet::PartnerEthernet;
 use crate::time::Instant;
@@ -76,14 +77,19 @@ pub(super) struct Marks {
 }
 
 impl Standby {
-    pub fn new(options: StandbyOptions, identity: &Identity, links: LinkSet, now: Instant) -> Standby {
+    pub fn new(
+        options: StandbyOptions,
+        identity: &Identity,
+        (links, control): (LinkSet, &RoleControl),
+        now: Instant,
+    ) -> Standby {
         let words: Arc<StandbyWords> = Arc::default();
         let has_ethernet = options.max_acyclic > 0 && links == LinkSet::Ring;
         let ethernet = has_ethernet.then(|| PartnerEthernet::new(*identity, options.max_acyclic, now));
         let (ethernet, endpoint) = ethernet.unzip();
         Standby {
             options,
-            listener: Some(Listener::new(words.clone())),
+            listener: Some(Listener::new(words.clone(), control.clone())),
             words,
             configuration: Configuration::default(),
             session: None,

@@ -7,6 +7,9 @@ use alloc::sync::Arc;
 use core::fmt;
 use core::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, Ordering};
 
+#[cfg(feature = "standby")]
+use ringcat_wire::master_frame::NotReady;
+
 use super::MainDeviceRole;
 
 /// What is requested of the role.
@@ -76,6 +79,10 @@ struct Words {
     request: AtomicU8,
     /// Reasons of the application against a takeover, as bits.
     not_ready: AtomicU16,
+    /// All reasons as of the last cycle, as bits. Writer: the half that runs the cycles; without an application the
+    /// one that listens.
+    #[cfg(feature = "standby")]
+    readiness: AtomicU16,
 }
 
 /// The role, and requests for another one; copies are handles to the same.
@@ -98,6 +105,8 @@ impl RoleControl {
             changes: AtomicU32::new(0),
             request: AtomicU8::new(0),
             not_ready: AtomicU16::new(0),
+            #[cfg(feature = "standby")]
+            readiness: AtomicU16::new(NotReady::NO_APPLICATION.0),
         };
         RoleControl { words: Arc::new(words) }
     }
@@ -171,6 +180,34 @@ impl RoleControl {
     /// The reasons that are set.
     pub fn not_ready(&self) -> u16 {
         self.words.not_ready.load(Ordering::Relaxed)
+    }
+
+    /// Whether this MainDevice is to stay INACTIVE (permanent standby): a policy then neither takes over nor accepts
+    /// the role. A requested role takes effect nevertheless.
+    #[cfg(feature = "standby")]
+    pub fn is_held(&self) -> bool {
+        NotReady(self.not_ready()).has(NotReady::HELD)
+    }
+
+    /// Switches the permanent standby on or off, from the next cycle on (the notifications 1 and 2 of protocol 9.10,
+    /// which also request [`RoleRequest::Inactive`] with the first one).
+    #[cfg(feature = "standby")]
+    pub fn hold(&self, held: bool) {
+        self.set_not_ready(NotReady::HELD.0, held);
+    }
+
+    /// Why a failure of one MainDevice now would cost more than the time-out of a takeover, as this one has seen it in
+    /// its last cycle; [`NotReady::NOTHING`] if it would not. As ACTIVE it contains the reasons of the other one and
+    /// its own, as INACTIVE its own.
+    #[cfg(feature = "standby")]
+    pub fn readiness(&self) -> NotReady {
+        NotReady(self.words.readiness.load(Ordering::Relaxed))
+    }
+
+    /// Posts [`RoleControl::readiness`].
+    #[cfg(feature = "standby")]
+    pub(crate) fn post_readiness(&self, reasons: NotReady) {
+        self.words.readiness.store(reasons.0, Ordering::Relaxed);
     }
 }
 

@@ -7,7 +7,6 @@ use ringcat_engine::exchange::Exchange;
 use ringcat_engine::link::Link;
 use ringcat_engine::time::Instant;
 use ringcat_engine::{Class, class_of};
-use ringcat_wire::master_frame::NotReady;
 
 use super::{Cyclic, States};
 use crate::acyclic::AcyclicHalf;
@@ -61,10 +60,13 @@ impl Cyclic {
     pub fn pass_on(&mut self, links: &mut impl Links, acyclic: &mut impl AcyclicHalf) {
         let Cyclic { exchange, of_two, .. } = self;
         if let Some(forwarder) = &mut of_two.forwarder {
-            forwarder.forward_and_read(
+            let taken = forwarder.forward_and_read(
                 links,
                 &mut Following { exchange, acyclic, partner_data_at: &mut of_two.partner_data_at },
             );
+            if taken > 0 {
+                self.cyclic_status.publish_forwarded(&forwarder.counters());
+            }
         }
         self.expect_other();
     }
@@ -74,7 +76,7 @@ impl Cyclic {
         let (period, main) = (self.period(), links.addresses().main);
         if let Some(control) = self.exchange.role_control() {
             let is_held = policy.is_some_and(|policy| !policy.takes_over);
-            control.set_not_ready(NotReady::HELD.0, is_held);
+            control.hold(is_held);
         }
         self.of_two.watch = policy.map(|policy| Watch::new(policy, period, main, links.now()));
     }
@@ -116,6 +118,7 @@ impl Cyclic {
             collided_with: exchange.take_collision(),
             writes: exchange.memory_write().is_some(),
             other_writes: exchange.memory_write_of_collided().is_some(),
+            is_held: exchange.is_held(),
         };
         if let Some(event) = watch.look_out(&situation, now) {
             exchange.report_standby(event);

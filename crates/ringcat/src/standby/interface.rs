@@ -11,6 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::task::Waker;
 use std::time::Duration;
 
+use ringcat_engine::main_device::MainDevice as Engine;
 use ringcat_engine::standby::{ETHERNET_QUEUE, PartnerEndpoint, PartnerTraffic};
 use ringcat_engine::time::Instant;
 use ringcat_link::tap::{TapError, TapInterface};
@@ -32,8 +33,7 @@ const BURST: usize = 64;
 pub enum PartnerInterfaceError {
     /// The host does not make it.
     Tap(TapError),
-    /// [`StandbyOptions::max_acyclic`](super::StandbyOptions::max_acyclic) is 0, or the endpoint is in use, or was used
-    /// before.
+    /// [`StandbyOptions::max_acyclic`](super::StandbyOptions::max_acyclic) is 0, or the endpoint is in use.
     NoEthernet,
     /// The thread has ended.
     Gone(Error),
@@ -44,7 +44,7 @@ impl fmt::Display for PartnerInterfaceError {
         match self {
             PartnerInterfaceError::Tap(error) => error.fmt(f),
             PartnerInterfaceError::NoEthernet => {
-                f.write_str("no Ethernet to the other MainDevice: it is off (max_acyclic), in use, or was used before")
+                f.write_str("no Ethernet to the other MainDevice: it is off (max_acyclic), or in use")
             }
             PartnerInterfaceError::Gone(error) => error.fmt(f),
         }
@@ -147,12 +147,18 @@ impl SupervisorThread {
         let endpoint = self.partner_endpoint().map_err(PartnerInterfaceError::Gone)?;
         let endpoint = endpoint.ok_or(PartnerInterfaceError::NoEthernet)?;
         let shared = Arc::new(Shared { ended: AtomicBool::new(false), status: Mutex::default(), waker: self.waker() });
-        let mut bridge =
+        let bridge =
             Bridge { endpoint, interface, shared: shared.clone(), up: None, refused: 0, refresh_at: Instant(0) };
-        let begun = match is_called {
-            true => self.attend(move |_, now| bridge.work(now)),
-            false => self.attend_often(move |_, now| bridge.work(now)),
+        let mut bridge = Some(bridge);
+        let work = move |engine: &mut Engine, now| {
+            let goes_on = bridge.as_mut().is_some_and(|moving| !moving.work(now));
+            if !goes_on {
+                // Another interface may use it.
+                bridge.take().into_iter().for_each(|ended| engine.return_partner_endpoint(ended.endpoint));
+            }
+            !goes_on
         };
+        let begun = if is_called { self.attend(work) } else { self.attend_often(work) };
         begun.map_err(PartnerInterfaceError::Gone)?;
         Ok(PartnerInterface(shared))
     }

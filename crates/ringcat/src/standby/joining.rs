@@ -39,7 +39,7 @@ pub enum Next {
 /// Listens before an application begins, and decides how it begins.
 #[derive(Debug)]
 pub struct Joining {
-    takes_over: bool,
+    control: RoleControl,
     silent_since: Instant,
     /// Silence after which this one becomes ACTIVE.
     limit: Duration,
@@ -47,16 +47,19 @@ pub struct Joining {
 }
 
 impl Joining {
-    /// Begins to listen.
+    /// Begins to listen. The policy decides whether it is in permanent standby; from then on [`RoleControl::hold`]
+    /// does.
     pub fn begin<L: Links>(main_device: &MainDevice<L>, policy: &Policy) -> Joining {
-        Joining::on(&main_device.links, policy)
+        let control = main_device.role_control();
+        control.hold(!policy.takes_over);
+        Joining::on(&main_device.links, control, policy)
     }
 
-    pub(crate) fn on(links: &impl Links, policy: &Policy) -> Joining {
+    pub(crate) fn on(links: &impl Links, control: RoleControl, policy: &Policy) -> Joining {
         let (main, now) = (links.addresses().main, links.now());
         let pause = Dice::new(main, now).up_to(policy.listen);
         let (limit, monitor) = (policy.listen + pause, ActiveMonitor::new(now));
-        Joining { takes_over: policy.takes_over, silent_since: now, limit, monitor }
+        Joining { control, silent_since: now, limit, monitor }
     }
 
     /// What follows from the frames that were received. Without a link that is up none can be received: then it listens
@@ -73,7 +76,7 @@ impl Joining {
 
     /// Whether an alarm is to be reported. A MainDevice that may become ACTIVE gets time to do so first.
     pub(crate) fn look_out(&mut self, partner: &PartnerStatus, now: Instant) -> Option<CyclicStandbyEvent> {
-        self.monitor.note(partner.at, self.limit.saturating_mul(if self.takes_over { 2 } else { 1 }), now)
+        self.monitor.note(partner.at, self.limit.saturating_mul(if self.control.is_held() { 1 } else { 2 }), now)
     }
 
     pub(crate) fn decide(&mut self, partner: &PartnerStatus, has_link: bool, now: Instant) -> Next {
@@ -83,7 +86,7 @@ impl Joining {
         self.silent_since = self.silent_since.max(partner.at.unwrap_or_default());
         let is_silent = now.since(self.silent_since) >= self.limit;
         match (partner.is_known, is_silent) {
-            (_, true) if self.takes_over => Next::BecomeActive,
+            (_, true) if !self.control.is_held() => Next::BecomeActive,
             (true, false) => Next::Follow,
             _ => Next::Listen,
         }
@@ -192,6 +195,7 @@ impl<L: Links> MainDevice<L> {
         policy: &Policy,
         declare: impl FnOnce(&Scan) -> Declaration,
     ) -> Result<Application<L>, Box<Refused<MainDevice<L>>>> {
+        let control = self.role_control();
         let mut joining = Joining::begin(&self, policy);
         let mut application = loop {
             if let Err(error) = self.listen(SLICE) {
@@ -209,13 +213,15 @@ impl<L: Links> MainDevice<L> {
                     self.become_active();
                     match self.scan_for_operation() {
                         Ok(scan) => break self.activate(declare(&scan))?,
-                        Err(Error::Scan(ScanError::RoleChanged)) => joining = Joining::begin(&self, policy),
+                        Err(Error::Scan(ScanError::RoleChanged)) => {
+                            joining = Joining::on(&self.links, control.clone(), policy);
+                        }
                         Err(error) => return Err(Box::new(Refused { error, main_device: self })),
                     }
                 }
             }
         };
-        application.set_policy(Some(*policy));
+        application.set_policy(Some(Policy { takes_over: !control.is_held(), ..*policy }));
         Ok(application)
     }
 }

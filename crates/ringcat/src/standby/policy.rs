@@ -48,7 +48,8 @@ pub enum OnCollision {
 #[non_exhaustive]
 pub struct Policy {
     /// Whether it takes over without being asked to. Otherwise it stays INACTIVE until a role is requested (permanent
-    /// standby), and is not handed the role over.
+    /// standby), and is not handed the role over. [`RoleControl::hold`](super::RoleControl::hold) changes that later,
+    /// from any thread.
     pub takes_over: bool,
     /// Cycles without process data of the ACTIVE after which it takes over. At least 3.
     pub time_out_cycles: u32,
@@ -137,6 +138,8 @@ pub(crate) struct Situation {
     pub writes: bool,
     /// Whether the other one does.
     pub other_writes: bool,
+    /// Whether this one is in permanent standby.
+    pub is_held: bool,
 }
 
 /// A policy, as it is followed.
@@ -167,7 +170,7 @@ impl Watch {
             self.monitor.is_active(now);
             return None;
         }
-        let limit = self.time_out.saturating_mul(if self.policy.takes_over { 3 } else { 1 });
+        let limit = self.time_out.saturating_mul(if situation.is_held { 1 } else { 3 });
         self.monitor.note(situation.partner_data_at.or(situation.partner_frame_at), limit, now)
     }
 
@@ -187,7 +190,7 @@ impl Watch {
                 // Until it has sent process data, an ACTIVE may be scanning. Then only process data counts.
                 let any = situation.partner_frame_at.unwrap_or(Instant(0));
                 let silent_since = situation.partner_data_at.unwrap_or(situation.inactive_since.max(any));
-                let is_over = self.policy.takes_over && now.since(silent_since) >= limit;
+                let is_over = !situation.is_held && now.since(silent_since) >= limit;
                 is_over.then_some(RoleRequest::Active)
             }
         }
@@ -254,6 +257,7 @@ mod tests {
             collided_with: None,
             writes: false,
             other_writes: false,
+            is_held: false,
         }
     }
 
@@ -268,8 +272,8 @@ mod tests {
         let mut watch = watch(Policy::default());
         assert_eq!(watch.decide(&inactive(Some(100)), Instant(115 * MS - 1)), None);
         assert_eq!(watch.decide(&inactive(Some(100)), Instant(115 * MS)), Some(RoleRequest::Active));
-        let mut held = self::watch(Policy::permanent_standby());
-        assert_eq!(held.decide(&inactive(Some(100)), Instant(900_000 * MS)), None);
+        let held = Situation { is_held: true, ..inactive(Some(100)) };
+        assert_eq!(watch.decide(&held, Instant(900_000 * MS)), None);
         let least = Policy::default().with_time_out(0, Duration::ZERO);
         assert_eq!(least.time_out_of(Duration::from_millis(4)), Duration::from_millis(12), "a cable may be cut");
     }

@@ -6,7 +6,7 @@ use ringcat_engine::main_device::{MainDeviceRole, SubDeviceId};
 use ringcat_engine::role::{Partner, RoleControl};
 use ringcat_engine::time::Instant;
 
-use super::{ForwardingCounters, Policy};
+use super::{ForwardingCounters, NotReady, Policy};
 use crate::acyclic::AcyclicHalf;
 use crate::application::Application;
 use crate::error::Error;
@@ -29,6 +29,13 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
     /// State of the other MainDevice, as determined while this one is ACTIVE.
     pub fn partner(&self) -> Partner {
         self.cyclic.exchange.partner()
+    }
+
+    /// Whether a failure of one MainDevice would now cost no more than the time-out of a takeover
+    /// ([`NotReady::NOTHING`]), or why not, as of the last cycle. [`RoleControl::readiness`] is the same for any
+    /// thread, [`StandbyEvent::Readiness`](super::StandbyEvent) reports changes.
+    pub fn takeover_readiness(&self) -> NotReady {
+        self.role_control().map_or(NotReady::ABSENT, |control| control.readiness())
     }
 
     /// When process data of the other MainDevice came last, since this one is INACTIVE.

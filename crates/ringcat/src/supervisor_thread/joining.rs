@@ -62,8 +62,10 @@ impl SupervisorThread {
             }
         };
         let of_two = OfTwo::new(&links, None);
+        let control = listener.role_control();
+        control.hold(!policy.takes_over);
         let mut application = Listening { supervisor: self, links, of_two, listener }.join(policy, declare)?;
-        application.set_policy(Some(*policy));
+        application.set_policy(Some(Policy { takes_over: !control.is_held(), ..*policy }));
         Ok(application)
     }
 
@@ -95,7 +97,8 @@ impl<C: Links> Listening<C> {
         policy: &Policy,
         declare: impl Fn(&Scan) -> Declaration + Clone + Send + 'static,
     ) -> Activated<C> {
-        let mut joining = Joining::on(&self.links, policy);
+        let control = self.listener.role_control();
+        let mut joining = Joining::on(&self.links, control.clone(), policy);
         loop {
             self.forward();
             if let Err(error) = self.of_two.counters().check_identity() {
@@ -122,7 +125,9 @@ impl<C: Links> Listening<C> {
                     match scan {
                         Ok(scan) => return self.supervisor.activate(declare(&scan), self.links),
                         // Another MainDevice is ACTIVE as well, and stays ACTIVE.
-                        Err(Error::Scan(ScanError::RoleChanged)) => joining = Joining::on(&self.links, policy),
+                        Err(Error::Scan(ScanError::RoleChanged)) => {
+                            joining = Joining::on(&self.links, control.clone(), policy);
+                        }
                         Err(error) => return Err(self.refused(error)),
                     }
                 }

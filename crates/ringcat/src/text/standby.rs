@@ -2,6 +2,7 @@
 
 use ringcat_engine::event::{Event, StandbyEvent};
 use ringcat_engine::role::MainDeviceRole;
+use ringcat_wire::master_frame::{NotReady, VERSION};
 
 use super::names::{Names, address};
 
@@ -31,8 +32,14 @@ pub(super) fn describe(event: &Event, names: &Names) -> Option<String> {
             format!("the other MainDevice has another configuration: {what}")
         }
         StandbyEvent::OtherVersion { got, least } => format!(
-            "the other MainDevice has master frames of version {got}, readable from version {least} on: update this one"
+            "the other MainDevice has master frames of version {got}, this one of version {VERSION}; from version \
+             {least} on they work with each other: update {}",
+            if *got > VERSION { "this one" } else { "the other one" }
         ),
+        StandbyEvent::Readiness(reasons) => match *reasons == NotReady::NOTHING {
+            true => "ready: either MainDevice can fail".to_owned(),
+            false => format!("not ready: {reasons}"),
+        },
         StandbyEvent::HandOverRefused(partner) => {
             format!("the role was not handed over: the other MainDevice is {partner}")
         }

@@ -13,6 +13,8 @@ mod partner_interface;
 mod process_data;
 mod protocols;
 mod readiness;
+#[cfg(feature = "standby")]
+mod remote;
 mod services;
 #[cfg(feature = "standby")]
 mod standby;

@@ -34,6 +34,7 @@ struct Ends {
     to_send: Vec<Vec<u8>>,
     received: Vec<Vec<u8>>,
     carrier: bool,
+    is_removed: bool,
 }
 
 impl Wire {
@@ -57,6 +58,10 @@ impl HostInterface for Wire {
 
     fn set_carrier(&mut self, carrier: bool) {
         self.with(|ends| ends.carrier = carrier);
+    }
+
+    fn exists(&self) -> bool {
+        !self.with(|ends| ends.is_removed)
     }
 }
 
@@ -123,6 +128,26 @@ fn interfaces_of_two_hosts_exchange_frames_through_acyclic_halves_in_threads() {
         let traffic = members.iter().map(|(_, interface)| interface.status().traffic);
         traffic.into_iter().all(|traffic| (traffic.sent, traffic.received, traffic.refused_length) == (6, 6, 6))
     });
+}
+
+// covers: REQ034, REQ036, standby
+#[test]
+fn an_interface_that_was_removed_leaves_its_place_to_another_one() {
+    let [(_cyclic, acyclic), _] = SharedSegment::halves_of_two(ring_of_two());
+    let options = Options::default().with_standby(StandbyOptions::default().with_max_acyclic(4));
+    let supervisor = SupervisorThread::start(acyclic, &options, || ()).expect("a thread starts");
+    let [first, second] = [Wire::default(), Wire::default()];
+    let interface = supervisor.start_partner_interface_on(Box::new(first.clone())).expect("it has Ethernet");
+    first.with(|ends| ends.is_removed = true);
+    until("the removal is seen", || interface.status().is_removed);
+    let mut again = None;
+    until("another one takes its place", || {
+        again = supervisor.start_partner_interface_on(Box::new(second.clone())).ok();
+        again.is_some()
+    });
+    // So does one that has ended in order.
+    drop(again);
+    until("a third one takes its place", || supervisor.start_partner_interface_on(Box::new(second.clone())).is_ok());
 }
 
 // covers: AC-07, REQ008, REQ006, standby

@@ -46,6 +46,7 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
         "eni" => [super::eni::GROUP, super::eni::COMMANDS].map(|text| text.as_bytes().to_vec()).to_vec(),
         "esi" => vec![super::esi::SMALL.as_bytes().to_vec()],
         "control" => super::control::seeds(),
+        "remote" => super::remote::seeds(),
         "master_frame" => super::master_frame::seeds(),
         "knowledge" => vec![super::knowledge::SMALL.to_vec()],
         "network" => vec![super::network::WHOLE.as_bytes().to_vec()],

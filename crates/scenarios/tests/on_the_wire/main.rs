@@ -25,6 +25,7 @@ mod json;
 mod junctions;
 mod mail_captures;
 mod messages;
+mod remote;
 mod running;
 mod said;
 mod scripts;

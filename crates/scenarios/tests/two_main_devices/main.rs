@@ -13,6 +13,7 @@ mod library_ethernet;
 mod memory_writes;
 mod outside_links;
 mod random_runs;
+mod readiness;
 mod rows;
 mod same_identity;
 mod taking_over;

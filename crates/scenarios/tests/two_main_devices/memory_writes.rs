@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use ringcat::standby::{MemoryWrite, RoleRequest, StandbyEvent, WriteKind};
+use ringcat::standby::{MasterSizes, MemoryWrite, RoleRequest, StandbyEvent, WriteKind};
 use ringcat::{FoeOptions, Position, SubDeviceId};
 use ringcat_engine::mail::foe;
 use ringcat_engine::mail::stream::Bytes;
@@ -104,6 +104,32 @@ fn a_forced_role_changes_and_a_takeover_names_what_was_cut_off() {
         assert_eq!((two.active(), cut(&two, 1)), (Some(1), Some(file)), "{}", two.log());
         assert!(refused(&two, 0).is_empty() && refused(&two, 1).is_empty());
     }
+}
+
+// covers: standby, 9.6, MR-17
+#[test]
+fn an_inactive_without_an_application_leaves_the_role_to_one_that_writes() {
+    // Without knowledge of the segment the second one never follows.
+    let mut sizes = MasterSizes::default();
+    sizes.knowledge = 0;
+    let mut two = Two::new(ring_of(&KINDS, Host::First), declare, standby().with_sizes(sizes));
+    two.controllers[0].begin_active();
+    two.until(Duration::from_secs(5), "all are in OP", Two::all_in_op);
+    two.run(Duration::from_millis(300));
+    two.mark();
+    let written = write_file(&mut two, 200_000);
+    assert!(!two.controllers[1].has_application());
+    two.controllers[1].request(RoleRequest::Active);
+    two.run(10 * CYCLE);
+    let file = MemoryWrite::new(WriteKind::File, false, DRIVE.0);
+    assert_eq!((two.active(), refused(&two, 1)), (Some(0), vec![file]), "{}", two.log());
+    assert!(written.is_running() && two.left_op.is_empty());
+    // After the failure of the one that writes nothing is refused.
+    two.kill(0);
+    two.run(4 * CYCLE);
+    two.controllers[1].request(RoleRequest::Active);
+    two.run(2 * CYCLE);
+    assert_eq!((two.active(), refused(&two, 1).len()), (Some(1), 1), "{}", two.log());
 }
 
 // covers: standby, 9.6

@@ -47,7 +47,7 @@ impl Stage {
     }
 }
 
-/// Why the INACTIVE cannot take over, as bits.
+/// Why a takeover would cost more than its time-out, as bits: what one of two MainDevices knows.
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
 pub struct NotReady(pub u16);
 
@@ -68,9 +68,24 @@ impl NotReady {
     pub const LINK: NotReady = NotReady(0x20);
     /// The application has a reason of its own.
     pub const APPLICATION: NotReady = NotReady(0x40);
+    /// No guard switches its interfaces off when it fails. This alone does not prevent a takeover.
+    pub const GUARD: NotReady = NotReady(0x80);
+    /// The watchdog of a SubDevice is too short for a takeover. This alone does not prevent one.
+    pub const WATCHDOG: NotReady = NotReady(0x100);
+    /// Not all knowledge of the segment has arrived: without it nothing can follow.
+    pub const KNOWLEDGE: NotReady = NotReady(0x200);
+    /// The other MainDevice has master frames of a version that cannot be read.
+    pub const VERSION: NotReady = NotReady(0x400);
+    /// Seen by the ACTIVE: no other MainDevice is there. Never in an answer.
+    pub const ABSENT: NotReady = NotReady(0x800);
+    /// Seen by the ACTIVE: the other MainDevice forwards, and does not answer. Never in an answer.
+    pub const NO_ANSWER: NotReady = NotReady(0x1000);
+
+    /// Reasons that do not prevent a takeover.
+    const MINOR: u16 = NotReady::LINK.0 | NotReady::GUARD.0 | NotReady::WATCHDOG.0;
 
     /// Names of the bits.
-    const NAMES: [(NotReady, &str); 7] = [
+    const NAMES: [(NotReady, &str); 13] = [
         (NotReady::NO_APPLICATION, "no application"),
         (NotReady::NO_CYCLE, "no whole cycle of master frames"),
         (NotReady::IDENTITY, "another configuration"),
@@ -78,6 +93,12 @@ impl NotReady {
         (NotReady::HELD, "held INACTIVE"),
         (NotReady::LINK, "a link is down"),
         (NotReady::APPLICATION, "the application is not ready"),
+        (NotReady::GUARD, "no guard"),
+        (NotReady::WATCHDOG, "a watchdog is too short"),
+        (NotReady::KNOWLEDGE, "knowledge of the segment is missing"),
+        (NotReady::VERSION, "master frames of another version"),
+        (NotReady::ABSENT, "the other MainDevice is absent"),
+        (NotReady::NO_ANSWER, "the other MainDevice forwards, and does not follow"),
     ];
 
     /// These bits and others.
@@ -91,9 +112,10 @@ impl NotReady {
         self.0 & other.0 == other.0
     }
 
-    /// Whether nothing prevents it. A link that is down does not ([`NotReady::LINK`]), an unknown bit does.
+    /// Whether nothing prevents a takeover. [`NotReady::LINK`], [`NotReady::GUARD`] and [`NotReady::WATCHDOG`] do not,
+    /// an unknown bit does.
     pub const fn is_ready(self) -> bool {
-        self.0 & !NotReady::LINK.0 == 0
+        self.0 & !NotReady::MINOR == 0
     }
 
     /// The reasons in words.

@@ -1,11 +1,12 @@
 //! The exchange of the ACTIVE: master frames out and back, and frames of others.
 
 use ringcat_wire::frame::MacAddress;
-use ringcat_wire::master_frame::{Phase, Stage, header_of_frame};
+use ringcat_wire::master_frame::{NotReady, Phase, Stage, header_of_frame};
 
 use super::Exchange;
 use super::partner::{Difference, Items};
 use super::state::{Offers, State};
+use crate::board::Board;
 use crate::event::CyclicStandbyEvent;
 use crate::exchange::Received;
 use crate::exchange::flight::Step;
@@ -33,7 +34,7 @@ impl Exchange {
                 self.tally.disturbed().lost += lost;
                 self.board.post_lost(self.tally.counters.lost);
             }
-            state.evaluate(&mut self.events);
+            state.evaluate(&self.board, &mut self.events);
         }
         let header = &mut state.frames.header;
         header.first = before.next().number();
@@ -125,8 +126,19 @@ impl Exchange {
 
 impl State {
     /// Evaluates what the last cycle has brought back.
-    fn evaluate(&mut self, events: &mut Producer) {
+    fn evaluate(&mut self, board: &Board, events: &mut Producer) {
         let returned = self.frames.returned();
+        let own = self.frames.header.least;
+        match returned.answer {
+            Some(answer) => {
+                let found = (answer.version < own).then_some((answer.version, own));
+                self.report_version(found, events);
+            }
+            None if returned.unreadable.is_some() => {
+                self.report_version(returned.unreadable, events);
+            }
+            None => {}
+        }
         if let Some(partner) = self.watch.note(&returned) {
             events.push(CyclicStandbyEvent::Partner(partner).pack());
         }
@@ -136,6 +148,18 @@ impl State {
         if self.frames.header.phase == Phase::Offers {
             self.offer(&returned, events);
         }
+        self.post_readiness(self.reasons_of_active(board), events);
+    }
+
+    /// `found`: version of the other MainDevice, and the oldest one that could read the newer of both; `None` if each
+    /// reads the other. A version that was found is reported once; true if there is one.
+    pub(super) fn report_version(&mut self, found: Option<(u8, u8)>, events: &mut Producer) -> bool {
+        let version = found.map(|(got, _)| got);
+        let is_new = core::mem::replace(&mut self.other_version, version) != version;
+        if let Some((got, least)) = found.filter(|_| is_new) {
+            events.push(CyclicStandbyEvent::OtherVersion { got, least }.pack());
+        }
+        found.is_some()
     }
 
     /// The role is offered: the next cycle is the last one if the other MainDevice takes it.
@@ -172,6 +196,31 @@ impl State {
         if self.frames.header.phase == Phase::Offers {
             self.frames.header.phase = Phase::Goes;
         }
+    }
+}
+
+impl State {
+    /// Posts the reasons of this cycle, and reports them when they have changed.
+    pub(super) fn post_readiness(&mut self, reasons: NotReady, events: &mut Producer) {
+        self.control.post_readiness(reasons);
+        if let Some(reasons) = self.readiness.note(reasons) {
+            events.push(CyclicStandbyEvent::Readiness(reasons).pack());
+        }
+    }
+
+    /// The reasons that the ACTIVE knows: its own, and those of the other MainDevice.
+    pub(super) fn reasons_of_active(&self, board: &Board) -> NotReady {
+        let is_down = |link: &Link| board.live.carrier(*link) == Some(false);
+        // A MainDevice that is to stay INACTIVE may be ACTIVE on request: its own role is no reason.
+        let own = NotReady(self.control.not_ready()).with(NotReady::HELD, false);
+        let own = own.with(NotReady::LINK, Link::ALL.iter().any(is_down) || own.has(NotReady::LINK));
+        let own = own.with(NotReady::VERSION, self.other_version.is_some());
+        let of_other = match self.watch.partner() {
+            Partner::Absent => NotReady::ABSENT,
+            Partner::Forwards => NotReady::NO_ANSWER,
+            Partner::Alive { not_ready, .. } => not_ready,
+        };
+        NotReady(own.0 | of_other.0)
     }
 }
 

@@ -8,7 +8,6 @@ use crate::board::Supervision;
 use crate::board::live::{Life, Presence};
 use crate::board::{Board, RingWord};
 use crate::domain::{DomainState, DomainStatus};
-use crate::event::CyclicStandbyEvent;
 use crate::exchange::domain::Domain;
 use crate::exchange::following::Unusable;
 use crate::link::Link;
@@ -96,18 +95,27 @@ impl State {
             .with(NotReady::IDENTITY, is_other)
             .with(NotReady::LAYOUT, is_elsewhere)
             .with(NotReady::LINK, Link::ALL.iter().any(is_down));
+        let of_version = self.note_version(events);
+        let not_ready = not_ready.with(NotReady::VERSION, of_version);
         self.following.answer.not_ready = not_ready;
+        self.post_readiness(not_ready, events);
         self.following.answer.item = self.items.next();
         let newest = self.following.newest().and_then(|(cycle, _)| self.following.header_of(cycle));
         if let Some((header, _)) = newest {
             super::active::compare(&mut self.items, (header.identity, header.item), events);
         }
-        if let Some(Unusable::Version { least, got }) = self.following.unusable
-            && self.other_version != Some(got)
-        {
-            self.other_version = Some(got);
-            events.push(CyclicStandbyEvent::OtherVersion { got, least }.pack());
-        }
+    }
+
+    /// Whether one of both MainDevices cannot read the master frames of the other one, which is reported once.
+    fn note_version(&mut self, events: &mut crate::queue::Producer) -> bool {
+        let newest = self.following.newest().and_then(|(cycle, _)| self.following.header_of(cycle));
+        let own = self.following.answer.least;
+        let found = match (self.following.unusable, newest) {
+            (Some(Unusable::Version { least, got }), _) => Some((got, least)),
+            (_, Some((header, _))) => (header.version < own).then_some((header.version, own)),
+            _ => return self.other_version.is_some(),
+        };
+        self.report_version(found, events)
     }
 
     /// Puts inputs and states of domains of the last whole cycle into the images.

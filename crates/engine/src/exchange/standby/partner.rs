@@ -136,7 +136,7 @@ mod tests {
     fn answered(stage: Stage, not_ready: NotReady) -> Returned {
         let mut answer = Answer::new();
         (answer.stage, answer.not_ready) = (stage, not_ready);
-        Returned { is_forwarded: true, is_taken: true, answer: Some(answer) }
+        Returned { is_forwarded: true, is_taken: true, answer: Some(answer), ..Returned::default() }
     }
 
     // covers: FR-11, 9.16, standby

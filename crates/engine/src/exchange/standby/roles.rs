@@ -1,9 +1,9 @@
 //! Changes of the role, at the beginning of a cycle (protocol MR-02, MR-07).
 
 use ringcat_wire::master_frame::{Answer, Header, Phase};
-use ringcat_wire::memory_write::MemoryWrite;
 
 use super::Exchange;
+use super::readiness::ReadinessWatch;
 use super::state::State;
 use crate::board::Board;
 use crate::board::live::Presence;
@@ -19,8 +19,6 @@ use crate::time::Instant;
 
 /// Acyclic frames of the ACTIVE before may be read for this time after it has handed its role over.
 const LAST_FRAMES_NS: u64 = 100_000_000;
-/// The ACTIVE goes on if its last cycle began at most this number of periods ago: less than any time-out (9.9).
-const GOES_ON: u128 = 3;
 
 /// What the beginning of a cycle does to the role.
 enum Change {
@@ -145,6 +143,7 @@ impl State {
     fn become_role(&mut self, role: MainDeviceRole) {
         self.role = role;
         self.watch.forget();
+        self.readiness = ReadinessWatch::default();
         (self.foreign_in, self.collided_with, self.collided_write) = (0, None, None);
         (self.shown, self.noticed) = (None, None);
         let (identity, item) = (self.following.answer.identity, self.items.first());
@@ -167,21 +166,13 @@ impl State {
         let write = match (self.role, request) {
             _ if is_forced => None,
             (MainDeviceRole::Active, RoleRequest::Inactive | RoleRequest::HandOver) => self.words.write(),
-            (MainDeviceRole::Inactive, RoleRequest::Active) => self.write_of_other(now),
+            (MainDeviceRole::Inactive, RoleRequest::Active) => self.words.partner_write(now),
             (MainDeviceRole::Active, RoleRequest::Active)
             | (MainDeviceRole::Inactive, RoleRequest::Inactive | RoleRequest::HandOver) => None,
         };
         let Some(write) = write else { return Some(request) };
         events.push(CyclicStandbyEvent::RoleRefused(write).pack());
         None
-    }
-
-    /// The write that the ACTIVE does, if its last cycle has just come.
-    fn write_of_other(&self, now: Instant) -> Option<MemoryWrite> {
-        let (cycle, begun_at) = self.following.newest()?;
-        let goes_on = now.since(begun_at).as_nanos() < u128::from(self.period_ns) * GOES_ON;
-        let (header, _) = self.following.header_of(cycle).filter(|_| goes_on)?;
-        header.write
     }
 
     /// What this MainDevice goes on with as ACTIVE. SubDevices stay as they are only if their registers are those of

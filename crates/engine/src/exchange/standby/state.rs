@@ -7,6 +7,7 @@ use ringcat_wire::frame::MacAddress;
 use ringcat_wire::memory_write::MemoryWrite;
 
 use super::partner::{Items, PartnerWatch};
+use super::readiness::ReadinessWatch;
 use crate::board::standby::StandbyWords;
 use crate::exchange::following::{Following, OutputsSeen};
 use crate::exchange::master_frames::MasterFrames;
@@ -61,6 +62,7 @@ pub(in crate::exchange) struct State {
     pub following: Following,
     pub outputs: OutputsSeen,
     pub watch: PartnerWatch,
+    pub readiness: ReadinessWatch,
     pub items: Items,
     pub exchanges_from: Arc<[u8]>,
     pub yields_without_links: bool,
@@ -82,7 +84,7 @@ pub(in crate::exchange) struct State {
     pub collided_with: Option<MacAddress>,
     /// The write into the memory of a SubDevice that it does, according to its last master frame.
     pub collided_write: Option<MemoryWrite>,
-    /// A version of the ACTIVE that cannot be read, and was reported.
+    /// A version of the other MainDevice with which this one cannot work, and that was reported.
     pub other_version: Option<u8>,
     /// The newest cycle of the ACTIVE when the last cycle of this MainDevice began.
     pub noticed: Option<u32>,

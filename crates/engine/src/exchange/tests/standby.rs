@@ -5,6 +5,7 @@ mod cuts;
 mod duo;
 mod handing_over;
 mod roles;
+mod versions;
 
 use std::vec;
 use std::vec::Vec;

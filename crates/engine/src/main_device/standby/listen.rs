@@ -17,7 +17,7 @@ impl MainDevice {
     pub fn split_listener(&mut self) -> Option<Listener> {
         let standby = self.standby.as_mut()?;
         standby.listener = None;
-        Some(Listener::new(standby.words.clone()))
+        Some(Listener::new(standby.words.clone(), self.roles.clone()))
     }
 
     /// Takes and fills a received frame of another MainDevice before it is forwarded: as INACTIVE with the options of

@@ -14,6 +14,7 @@ use crate::board::standby::StandbyWords;
 use crate::exchange::following::{Following, Unusable};
 use crate::knowledge::Knowledge;
 use crate::link::Link;
+use crate::role::RoleControl;
 use crate::time::Instant;
 
 /// What an INACTIVE MainDevice has received from the ACTIVE.
@@ -45,13 +46,14 @@ pub struct PartnerDiagnosis {
 pub struct Listener {
     listening: Following,
     words: Arc<StandbyWords>,
+    control: RoleControl,
 }
 
 impl Listener {
-    pub(in crate::main_device) fn new(words: Arc<StandbyWords>) -> Listener {
+    pub(in crate::main_device) fn new(words: Arc<StandbyWords>, control: RoleControl) -> Listener {
         let mut listening = Following::new(Lengths::default(), words.clone());
         listening.answer.not_ready = NotReady::NO_APPLICATION;
-        Listener { listening, words }
+        Listener { listening, words, control }
     }
 
     /// Takes and fills a received frame of another MainDevice before it is forwarded. Any bytes are allowed. Neither
@@ -59,9 +61,24 @@ impl Listener {
     pub fn fill(&mut self, arrived_on: Link, frame: &mut [u8], now: Instant) {
         self.words.post_partner_frame(now);
         self.listening.fill(arrived_on, frame, now);
-        if let Some(Unusable::Version { least, got }) = self.listening.unusable {
-            self.words.post_other_version(least, got);
-        }
+        let unreadable = match self.listening.unusable {
+            Some(Unusable::Version { least, got }) => {
+                self.words.post_other_version(least, got);
+                true
+            }
+            _ => false,
+        };
+        let is_known = self.words.partner_knowledge.version().is_some();
+        self.listening.answer.not_ready = NotReady(self.control.not_ready())
+            .with(NotReady::NO_APPLICATION, true)
+            .with(NotReady::KNOWLEDGE, !is_known)
+            .with(NotReady::VERSION, unreadable);
+        self.control.post_readiness(self.listening.answer.not_ready);
+    }
+
+    /// The role, and requests for another one: for any thread.
+    pub fn role_control(&self) -> RoleControl {
+        self.control.clone()
     }
 
     /// What has arrived so far.

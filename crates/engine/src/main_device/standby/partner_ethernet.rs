@@ -20,6 +20,13 @@ impl MainDevice {
         self.standby.as_mut()?.endpoint.take()
     }
 
+    /// Gives an endpoint of [`MainDevice::partner_endpoint`] back, so that it can be taken again.
+    pub fn return_partner_endpoint(&mut self, endpoint: PartnerEndpoint) {
+        if let Some(standby) = &mut self.standby {
+            standby.endpoint = Some(endpoint);
+        }
+    }
+
     /// A copy of an own frame has come back after the role has become INACTIVE: takes an Ethernet frame in it. Any
     /// bytes are allowed.
     pub fn take_returned(&mut self, bytes: &[u8], now: Instant) {

@@ -5,6 +5,7 @@ use core::time::Duration;
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::frame::MAX_FRAME;
+use ringcat_wire::master_frame::NotReady;
 
 use super::identity::Configuration;
 use crate::board::standby::KNOWLEDGE_ROOM;
@@ -114,7 +115,9 @@ impl MainDevice {
 
     /// Reports each of these SubDevices.
     pub fn report_watchdogs_within(&mut self, gap: Duration, cycle: Duration, now: Instant) {
-        for (subdevice, watchdog, needed) in self.watchdogs_within(gap, cycle) {
+        let short = self.watchdogs_within(gap, cycle);
+        self.roles.set_not_ready(NotReady::WATCHDOG.0, !short.is_empty());
+        for (subdevice, watchdog, needed) in short {
             self.report_standby(StandbyEvent::WatchdogTooShort { subdevice, watchdog, needed }, now);
         }
     }

@@ -111,8 +111,12 @@ impl MainDevice {
         if role == self.role() {
             return;
         }
-        let write = self.memory_write_under_way().filter(|_| role == MainDeviceRole::Inactive && !is_forced);
-        if let Some(write) = write {
+        let write = match role {
+            MainDeviceRole::Inactive => self.memory_write_under_way(),
+            // The listener of the other MainDevice's frames, in whatever thread it is, has read it.
+            MainDeviceRole::Active => self.standby.as_ref().and_then(|standby| standby.words.partner_write(now)),
+        };
+        if let Some(write) = write.filter(|_| !is_forced) {
             let event = Event::Standby(StandbyEvent::RoleRefused(write));
             self.supervisor.append_event(now, event);
         } else {

@@ -1,0 +1,150 @@
+//! Switchovers on a schedule, as proof that the other controller can take over (`--switch-every`).
+//!
+//! In: the time, the role, whether a failure of one controller is survived now, and why a request was refused.
+//! Out: what is to be done or said. The ACTIVE hands its role over; the new ACTIVE, with the same option, hands it back
+//! in its turn.
+
+use std::time::Duration;
+
+use ringcat::standby::NotReady;
+use ringcat::{Instant, MainDeviceRole};
+
+use crate::json::standby::Switchovers;
+
+/// The other MainDevice has this long to take the role.
+pub const HAND_OVER_LIMIT: Duration = Duration::from_secs(1);
+
+/// Where it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    /// The other MainDevice is ACTIVE.
+    Inactive,
+    /// The next switchover is due then.
+    Waits { due: Instant },
+    /// The role was offered.
+    Asked { at: Instant },
+}
+
+/// What follows.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Request the hand-over.
+    Request,
+    /// The role was handed over, this long after the request.
+    Done(Duration),
+    /// It was not, and why.
+    Refused(String),
+}
+
+/// The schedule.
+#[derive(Debug)]
+pub struct Schedule {
+    every: Duration,
+    state: State,
+    seen: Switchovers,
+}
+
+impl Schedule {
+    /// A switchover each time this controller has been ACTIVE for this time.
+    pub fn new(every: Duration) -> Schedule {
+        Schedule { every, state: State::Inactive, seen: Switchovers::default() }
+    }
+
+    /// What follows now. `refused`: why the last request was refused, which is taken.
+    pub fn step(
+        &mut self,
+        now: Instant,
+        role: MainDeviceRole,
+        readiness: NotReady,
+        refused: &mut Option<String>,
+    ) -> Option<Step> {
+        let due = now + self.every;
+        let (state, step) = match (self.state, role) {
+            (State::Asked { at }, MainDeviceRole::Inactive) => (State::Inactive, Some(Step::Done(now.since(at)))),
+            (_, MainDeviceRole::Inactive) => (State::Inactive, None),
+            (State::Inactive, MainDeviceRole::Active) => (State::Waits { due }, None),
+            (State::Waits { due: at }, MainDeviceRole::Active) if now >= at => match readiness {
+                NotReady::NOTHING => {
+                    *refused = None;
+                    (State::Asked { at: now }, Some(Step::Request))
+                }
+                reasons => (State::Waits { due }, Some(Step::Refused(format!("not ready: {reasons}")))),
+            },
+            (State::Asked { at }, MainDeviceRole::Active) => {
+                let is_late = now.since(at) >= HAND_OVER_LIMIT;
+                let late = is_late.then(|| "the other MainDevice did not take the role".to_owned());
+                match refused.take().or(late) {
+                    Some(why) => (State::Waits { due }, Some(Step::Refused(why))),
+                    None => (self.state, None),
+                }
+            }
+            (state, _) => (state, None),
+        };
+        self.state = state;
+        self.count(step.as_ref());
+        step
+    }
+
+    fn count(&mut self, step: Option<&Step>) {
+        match step {
+            Some(Step::Done(time)) => {
+                self.seen.done += 1;
+                let ns = u64::try_from(time.as_nanos()).unwrap_or(u64::MAX);
+                self.seen.longest_ns = Some(self.seen.longest_ns.unwrap_or_default().max(ns));
+            }
+            Some(Step::Refused(_)) => self.seen.refused += 1,
+            Some(Step::Request) | None => {}
+        }
+    }
+
+    /// What has happened.
+    pub fn seen(&self) -> Switchovers {
+        self.seen.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ACTIVE: MainDeviceRole = MainDeviceRole::Active;
+    const INACTIVE: MainDeviceRole = MainDeviceRole::Inactive;
+    const READY: NotReady = NotReady::NOTHING;
+
+    fn at(ms: u64) -> Instant {
+        Instant(ms * 1_000_000)
+    }
+
+    // covers: standby, MR-07
+    #[test]
+    fn the_role_is_handed_over_each_time_this_one_was_active_for_the_time() {
+        let mut schedule = Schedule::new(Duration::from_millis(100));
+        let mut none = None;
+        let mut step = |ms, role| schedule.step(at(ms), role, READY, &mut none);
+        assert_eq!((step(0, INACTIVE), step(500, ACTIVE), step(599, ACTIVE)), (None, None, None));
+        assert_eq!((step(600, ACTIVE), step(602, ACTIVE)), (Some(Step::Request), None));
+        assert_eq!(step(606, INACTIVE), Some(Step::Done(Duration::from_millis(6))));
+        assert_eq!((step(700, INACTIVE), step(900, ACTIVE)), (None, None), "the other one has handed it back");
+        assert_eq!(step(1_000, ACTIVE), Some(Step::Request));
+        let Switchovers { done, refused, longest_ns } = schedule.seen();
+        assert_eq!((done, refused, longest_ns), (1, 0, Some(6_000_000)));
+    }
+
+    // covers: standby, MR-07
+    #[test]
+    fn a_switchover_is_refused_when_not_ready_when_refused_and_when_late() {
+        let mut schedule = Schedule::new(Duration::from_millis(100));
+        let mut refused = Some("of another request".to_owned());
+        schedule.step(at(0), ACTIVE, READY, &mut refused);
+        let not_ready = schedule.step(at(100), ACTIVE, NotReady::LINK.with(NotReady::GUARD, true), &mut refused);
+        assert_eq!(not_ready, Some(Step::Refused("not ready: a link is down, no guard".to_owned())));
+        assert_eq!(schedule.step(at(200), ACTIVE, READY, &mut refused), Some(Step::Request));
+        assert_eq!(schedule.step(at(201), ACTIVE, READY, &mut refused), None);
+        refused = Some("kept".to_owned());
+        assert_eq!(schedule.step(at(202), ACTIVE, READY, &mut refused), Some(Step::Refused("kept".to_owned())));
+        assert_eq!(schedule.step(at(302), ACTIVE, READY, &mut refused), Some(Step::Request));
+        let late = schedule.step(at(1_302), ACTIVE, READY, &mut refused);
+        assert_eq!(late, Some(Step::Refused("the other MainDevice did not take the role".to_owned())));
+        assert_eq!((schedule.seen().done, schedule.seen().refused), (0, 3));
+    }
+}
