@@ -335,7 +335,7 @@ mod tests {
         let complete = domain(DomainState::Complete, 0);
         let broken = domain(DomainState::Incomplete, 1);
         let late = INTERRUPTION;
-        assert_eq!(due(&[broken.clone()], late), None, "before the first complete cycle");
+        assert_eq!(due(std::slice::from_ref(&broken), late), None, "before the first complete cycle");
         assert_eq!(due(&[complete.clone(), broken.clone()], Duration::ZERO), None);
         assert_eq!(due(&[complete.clone(), broken.clone()], late), Some(RecordReason::WorkingCounter));
         let ended = |cycles| [complete.clone(), broken.clone(), domain(DomainState::Complete, cycles)];
