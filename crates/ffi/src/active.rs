@@ -3,12 +3,14 @@
 //! A bus that the daemon has taken back, because the process was stopped, shows with the next call that receives: from
 //! then on all cyclic calls are refused until the handle is deactivated or released.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use ringcat::daemon::OwnershipWatch;
 use ringcat::{Application, Instant, SupervisorThread};
 
 use crate::any_links::AnyLinks;
+use crate::bus::Bus;
 use crate::code::{Code, Outcome};
 
 /// Longer than the wait for any frame.
@@ -90,13 +92,17 @@ pub struct Active {
     has_clock: bool,
     /// Of a bus from a daemon.
     ownership: Option<OwnershipWatch>,
+    /// Of a bus of this process: it ends after the application, wherever that is dropped, and until then no other bus
+    /// opens its links. One from a daemon goes back there.
+    _bus: Option<Arc<Bus>>,
 }
 
 impl Active {
     /// An application that has not sent anything.
-    pub fn new(application: App, has_clock: bool, ownership: Option<OwnershipWatch>) -> Active {
-        let now = application.now();
-        Active { application, sent_at: now, awaited: now, distributes: false, has_clock, ownership }
+    pub fn new(application: App, has_clock: bool, bus: Arc<Bus>) -> Active {
+        let (now, ownership) = (application.now(), bus.ownership());
+        let _bus = ownership.is_none().then_some(bus);
+        Active { application, sent_at: now, awaited: now, distributes: false, has_clock, ownership, _bus }
     }
 
     #[inline(always)]

@@ -31,6 +31,8 @@ const SILENCE: Duration = Duration::from_millis(300);
 const PAUSE: Duration = Duration::from_micros(500);
 /// Longest wait of a request while the master passes from one process to another.
 const CHANGE: Duration = Duration::from_secs(5);
+/// Why a master cannot be opened after a failure.
+const ABANDONED: &str = "an application on it failed in this process; release the other handles of this master first";
 static BUSES: OfProcess<Mutex<Vec<Weak<Bus>>>> = OfProcess::new();
 
 /// The bus of a master.
@@ -98,12 +100,13 @@ impl Bus {
     /// The bus of a master whose links this process opens; opened if no handle has it open.
     ///
     /// # Errors
-    /// What is wrong, for the operator.
+    /// What is wrong, for the operator. Also: an application on it failed, and another handle has the bus still.
     pub fn open(master: u32) -> Result<Arc<Bus>, String> {
         let mut buses = BUSES.lock();
         buses.retain(|bus| bus.strong_count() > 0);
         if let Some(bus) = buses.iter().filter_map(Weak::upgrade).find(|bus| bus.is(master)) {
-            return Ok(bus);
+            // A second MainDevice on the same links would disturb it.
+            return if bus.is_abandoned.load(Ordering::Acquire) { Err(ABANDONED.to_owned()) } else { Ok(bus) };
         }
         let bus = Arc::new(Bus::start(master)?);
         buses.push(Arc::downgrade(&bus));
@@ -136,10 +139,11 @@ impl Bus {
     }
 
     fn is(&self, master: u32) -> bool {
-        self.master == master && self.generation == generation() && !self.is_abandoned.load(Ordering::Acquire)
+        self.master == master && self.generation == generation()
     }
 
-    /// No further handle gets this bus: its links were lost with an application that failed.
+    /// No further handle gets this bus, whose cyclic links are lost with an application that failed. When the last
+    /// handle is released it ends, and the next one opens a new bus.
     pub fn abandon(&self) {
         self.is_abandoned.store(true, Ordering::Release);
     }

@@ -29,6 +29,9 @@ pub struct Draft {
     found: Vec<SubDeviceInfo>,
     /// Vendor and product 0xFFFFFFFF stand for any.
     has_wildcards: bool,
+    /// A panic within the end of the application.
+    #[cfg(test)]
+    pub panics_when_cleared: bool,
 }
 
 impl Draft {
@@ -102,6 +105,8 @@ impl Draft {
 
     /// Nothing is declared any more; what the scan has found and the program expects stays.
     pub fn clear(&mut self) {
+        #[cfg(test)]
+        assert!(!self.panics_when_cleared, "provoked by a test");
         let (found, send_interval, has_wildcards) =
             (std::mem::take(&mut self.found), self.send_interval, self.has_wildcards);
         *self = Draft { found, send_interval, has_wildcards, ..Draft::default() };

@@ -31,11 +31,18 @@ const END_LIMIT: Duration = Duration::from_secs(5);
 /// Longest wait for a cyclic call of another thread.
 const CLAIM_LIMIT: Duration = Duration::from_secs(1);
 
+/// Limit of the way to PREOP on a bus. No frame reaches the SubDevices of one that the daemon has taken back.
+fn end_limit(bus: &Bus) -> Duration {
+    if bus.check_held().is_ok() { END_LIMIT } else { Duration::ZERO }
+}
+
 /// What a handle has of its master.
 #[derive(Debug)]
 enum Access {
-    /// The bus: this process has opened the links, or a daemon has handed them over to this handle.
+    /// The bus: this process has opened the links.
     Bus(Arc<Bus>),
+    /// The bus, reserved for this handle: of this process, or handed over by a daemon.
+    Reserved(Arc<Bus>),
     /// Questions to a daemon.
     Daemon(Arc<Responder>),
     /// Nothing: it was released.
@@ -109,7 +116,7 @@ impl Master {
     /// It was released, or a daemon has the bus because this handle has not reserved it.
     pub fn bus(&self) -> Outcome<Arc<Bus>> {
         match &*locked(&self.access) {
-            Access::Bus(bus) => Ok(bus.clone()),
+            Access::Bus(bus) | Access::Reserved(bus) => Ok(bus.clone()),
             Access::Daemon(_) => Err(Code::NOT_RESERVED),
             Access::Released => Err(Code::INVALID),
         }
@@ -121,7 +128,7 @@ impl Master {
     /// It was released, or the daemon has taken the bus back.
     pub fn responder(&self) -> Outcome<Arc<Responder>> {
         match &*locked(&self.access) {
-            Access::Bus(bus) => bus.check_held().map(|()| bus.responder()),
+            Access::Bus(bus) | Access::Reserved(bus) => bus.check_held().map(|()| bus.responder()),
             Access::Daemon(responder) => Ok(responder.clone()),
             Access::Released => Err(Code::INVALID),
         }
@@ -133,7 +140,6 @@ impl Master {
     /// Another handle or process has it, or this handle has it already.
     pub fn reserve(&self) -> Outcome {
         let bus = self.take()?;
-        bus.reserve()?;
         bus.wait_until_scanned();
         let mut draft = locked(&self.draft);
         draft.set_found(bus.found()?);
@@ -143,19 +149,20 @@ impl Master {
         Ok(())
     }
 
-    /// The bus, from a daemon if it does not have it.
+    /// The bus, reserved for this handle; from a daemon if it does not have it.
     fn take(&self) -> Outcome<Arc<Bus>> {
         let mut access = locked(&self.access);
-        let taken = match &*access {
+        let bus = match &*access {
             Access::Daemon(responder) => match &**responder {
                 Responder::Daemon(responder) => Bus::take(responder)?,
                 Responder::Here(_) => return Err(Code::INVALID),
             },
-            Access::Bus(bus) => return Ok(bus.clone()),
+            Access::Bus(bus) | Access::Reserved(bus) => bus.clone(),
             Access::Released => return Err(Code::INVALID),
         };
-        *access = Access::Bus(taken.clone());
-        Ok(taken)
+        bus.reserve()?;
+        *access = Access::Reserved(bus.clone());
+        Ok(bus)
     }
 
     /// Whether this handle has reserved the bus.
@@ -273,12 +280,11 @@ impl Master {
         let bus = self.bus()?;
         let taken = self.application.use_within(CLAIM_LIMIT, Slot::take)?;
         let Active { mut application, .. } = taken.ok_or(Code::INVALID)?;
-        // No frame reaches the SubDevices of a bus that the daemon has taken back; the log already has this.
+        // The log already has that the daemon has taken the bus back.
         let is_held = bus.check_held().is_ok();
-        let limit = if is_held { END_LIMIT } else { Duration::ZERO };
         let mut draft = locked(&self.draft);
         self.keep_memory(&draft, |domain| application.give_memory_back(domain));
-        let ended = match application.deactivate(LastOutputs::Zero, limit) {
+        let ended = match application.deactivate(LastOutputs::Zero, end_limit(&bus)) {
             Ok(ended) => ended,
             Err(refused) => {
                 if is_held {
@@ -299,32 +305,44 @@ impl Master {
     }
 
     /// Ends everything that the handle has.
-    pub fn release(&self) {
+    ///
+    /// # Errors
+    /// [`Code::IO`]: a cyclic call panicked. What is left is for [`Master::abandon`].
+    pub fn release(&self) -> Outcome {
         // An activation in another thread ends before, and a later one finds that nothing is reserved.
-        let was_reserved = {
+        {
             let _draft = locked(&self.draft);
-            self.is_reserved.swap(false, Ordering::AcqRel)
-        };
-        if self.is_active() {
-            let _ = self.end();
+            self.is_reserved.store(false, Ordering::Release);
+        }
+        if self.is_active() && self.end() == Err(Code::IO) {
+            return Err(Code::IO);
         }
         let access = std::mem::replace(&mut *locked(&self.access), Access::Released);
-        if let (true, Access::Bus(bus)) = (was_reserved, access) {
+        if let Access::Reserved(bus) = access {
             bus.unreserve();
         }
+        Ok(())
     }
 
     /// Gives everything up after a panic. What the application has is dropped, not used: its SubDevices are left to the
-    /// daemon, or without one to their watchdogs.
+    /// daemon, or without one to their watchdogs. A bus of another handle stays as it is.
     pub fn abandon(&self) {
-        let was_reserved = self.is_reserved.swap(false, Ordering::AcqRel);
-        self.is_active.store(false, Ordering::Release);
-        let failed = self.application.recover(Slot::Empty);
-        drop(failed.or_else(|| self.application.use_within(CLAIM_LIMIT, std::mem::take).ok()));
         let access = std::mem::replace(&mut *locked(&self.access), Access::Released);
-        if let (true, Access::Bus(bus)) = (was_reserved, access) {
+        if let Access::Reserved(bus) = &access {
             bus.abandon();
         }
+        self.is_reserved.store(false, Ordering::Release);
+        self.is_active.store(false, Ordering::Release);
+        // May panic too: everything else is given up by now. Without a daemon the application has the bus as long
+        // as it exists.
+        let failed = self.application.recover(Slot::Empty);
+        drop(failed.or_else(|| self.application.use_within(CLAIM_LIMIT, std::mem::take).ok()));
+    }
+
+    /// The end of the application panics.
+    #[cfg(test)]
+    pub fn panic_at_the_end(&self) {
+        locked(&self.draft).panics_when_cleared = true;
     }
 
     /// A cyclic call: uses the application, or does nothing while there is none.

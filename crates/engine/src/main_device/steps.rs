@@ -30,7 +30,9 @@ use crate::topology::{Closing, NodeStatus};
 
 impl MainDevice {
     /// First step: loads a declaration. It replaces a previously loaded one, with all added connections. After an error
-    /// in the declaration nothing is loaded, and the memory of its images can be taken ([`MainDevice::unused_memory`]).
+    /// in the declaration nothing is loaded, and the memory of its images can be taken ([`MainDevice::unused_memory`]);
+    /// memory that a copy of the declaration has too stays with the copy. If it is not permitted, what was loaded
+    /// before stays, and the memory of the refused declaration does not come back.
     ///
     /// # Errors
     /// [`ActivateError::NotPermitted`], and errors in the declaration alone.
@@ -48,7 +50,7 @@ impl MainDevice {
         Ok(())
     }
 
-    /// Gives back the memory of a declaration that was not activated: after an error of [`MainDevice::load`] or of the
+    /// Gives back the memory of a declaration that was not activated: after an error in the declaration, or of the
     /// activation.
     pub fn unused_memory(&mut self, domain: DomainId) -> Option<&'static mut [u8]> {
         self.memories.0.get_mut(domain.0)?.take()

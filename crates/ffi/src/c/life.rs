@@ -1,6 +1,7 @@
 //! Life of a master: request, open, reserve, activate, deactivate, release.
 
 use std::ffi::{c_int, c_uint};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::ptr::null_mut;
 use std::sync::Arc;
 
@@ -8,7 +9,7 @@ use super::guard::caught;
 use super::handle::{Ending, alive, alive_or_failed, ask, bury, call, ending, give};
 use super::objects::{DomainObject, MasterObject, Owner, ec_domain_t, ec_master_t, ec_slave_config_t};
 use super::opened::{self, Opened};
-use crate::code::{Outcome, report};
+use crate::code::{Code, Outcome, report};
 use crate::host::at_exit;
 use crate::master::Master;
 use crate::settings::Name;
@@ -103,11 +104,20 @@ unsafe extern "C" fn ecrt_release_master(master: *mut ec_master_t) {
         // SAFETY: a handle of the library (ecrt.h).
         if let Ok((MasterObject(owner), has_failed)) = unsafe { alive_or_failed(master) } {
             let owner = owner.clone();
-            opened::remove(master as usize);
-            // The handle ends first: a second release at the same time does nothing.
-            bury(ending(master));
-            owner.end_children();
-            if has_failed { owner.master.abandon() } else { owner.master.release() }
+            let ended = catch_unwind(AssertUnwindSafe(|| {
+                opened::remove(master as usize);
+                // The handle ends first: a second release at the same time does nothing.
+                bury(ending(master));
+                owner.end_children();
+                if has_failed { Err(Code::IO) } else { owner.master.release() }
+            }));
+            // A cyclic call may have panicked meanwhile, and the release itself: the master can be opened again.
+            if !matches!(ended, Ok(Ok(()))) {
+                owner.master.abandon();
+            }
+            if let Err(panic) = ended {
+                resume_unwind(panic);
+            }
         }
     };
     caught(master as usize, (), release)
@@ -174,31 +184,121 @@ unsafe extern "C" fn ecrt_master_select_reference_clock(master: *mut ec_master_t
 mod tests {
     use super::*;
     use crate::active::Active;
-    use crate::code::Code;
+
+    fn simulate(index: c_uint) {
+        let segment = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/c/services.toml");
+        // SAFETY: the tests of this crate read variables by the standard library alone, which has a lock for them.
+        unsafe { std::env::set_var(format!("RINGCAT_SIM_{index}"), segment) };
+    }
+
+    /// A requested master with an active application.
+    fn active(index: c_uint) -> (*mut ec_master_t, *mut ec_domain_t) {
+        let master = ecrt_request_master(index);
+        assert!(!master.is_null(), "it can be requested");
+        // SAFETY: handles of the library.
+        let domain = unsafe { ecrt_master_create_domain(master) };
+        // SAFETY: handles of the library.
+        assert_eq!(unsafe { ecrt_master_activate(master) }, 0);
+        (master, domain)
+    }
+
+    fn cycle(domain: *mut ec_domain_t, work: fn(&mut Active)) -> c_int {
+        // SAFETY: a handle of the library.
+        unsafe { call(domain, |domain| domain.owner.master.cycle(work)) }
+    }
+
+    fn owner(master: *mut ec_master_t) -> Arc<Owner> {
+        // SAFETY: a handle of the library.
+        unsafe { alive_or_failed(master) }.expect("it is not released").0.0.clone()
+    }
 
     /// A panic in the cycle leaves the application half changed: it is dropped at the release, not used.
     // covers: c-interface
     #[test]
     fn a_panic_in_a_cyclic_call_ends_the_use_of_the_application_until_a_release() {
-        let segment = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/c/services.toml");
-        // SAFETY: the tests of this crate read variables by the standard library alone, which has a lock for them.
-        unsafe { std::env::set_var("RINGCAT_SIM_71", segment) };
+        simulate(71);
         for _ in 0..2 {
-            let master = ecrt_request_master(71);
+            let (master, domain) = active(71);
+            assert_eq!(cycle(domain, Active::send), 0);
+            assert_eq!(cycle(domain, |_| panic!("half changed")), Code::IO.0);
+            assert_eq!(cycle(domain, Active::send), Code::IO.0);
+            assert_eq!(owner(master).master.cycle(Active::send), Err(Code::IO));
             // SAFETY: handles of the library.
             unsafe {
-                let domain = ecrt_master_create_domain(master);
-                assert_eq!(ecrt_master_activate(master), 0);
-                let cyclic = |work: fn(&mut Active)| call(domain, |domain| domain.owner.master.cycle(work));
-                assert_eq!(cyclic(Active::send), 0);
-                assert_eq!(cyclic(|_| panic!("half changed")), Code::IO.0);
-                assert_eq!(cyclic(Active::send), Code::IO.0);
-                let owner = &alive_or_failed(master).expect("it is not released").0.0;
-                assert_eq!(owner.master.cycle(Active::send), Err(Code::IO));
                 assert_eq!((ecrt_master_activate(master), ecrt_master_deactivate(master)), (Code::IO.0, Code::IO.0));
                 ecrt_release_master(master);
                 assert_eq!(ecrt_master_activate(master), Code::INVALID.0);
             }
+        }
+    }
+
+    // covers: c-interface
+    #[test]
+    fn after_a_panic_within_a_release_the_master_can_be_requested_again() {
+        simulate(72);
+        for _ in 0..2 {
+            let (master, domain) = active(72);
+            assert_eq!(cycle(domain, Active::send), 0);
+            owner(master).master.panic_at_the_end();
+            // SAFETY: handles of the library.
+            unsafe {
+                ecrt_release_master(master);
+                assert_eq!(ecrt_master_activate(master), Code::INVALID.0);
+            }
+        }
+    }
+
+    /// As a cyclic call of another thread does after the release has looked at the handle.
+    // covers: c-interface
+    #[test]
+    fn a_cyclic_call_that_panics_during_a_release_leaves_the_master_usable() {
+        simulate(73);
+        for _ in 0..2 {
+            let (master, domain) = active(73);
+            let owner = owner(master);
+            let panics = || owner.master.cycle::<()>(|_| panic!("half changed"));
+            assert!(catch_unwind(AssertUnwindSafe(panics)).is_err());
+            assert_eq!(cycle(domain, Active::send), Code::IO.0);
+            // SAFETY: a handle of the library.
+            unsafe { ecrt_release_master(master) };
+        }
+    }
+
+    // covers: c-interface
+    #[test]
+    fn after_a_failure_no_second_bus_opens_the_links_that_another_handle_has() {
+        simulate(74);
+        let beside = ecrt_open_master(74);
+        let (master, domain) = active(74);
+        assert_eq!(cycle(domain, |_| panic!("half changed")), Code::IO.0);
+        // SAFETY: handles of the library.
+        unsafe {
+            ecrt_release_master(master);
+            assert!(ecrt_open_master(74).is_null() && ecrt_request_master(74).is_null());
+            assert_eq!(ecrt_master_reserve(beside), Code::BUSY.0);
+            assert!(owner(beside).master.overview().is_ok(), "it can ask still");
+            ecrt_release_master(beside);
+            let (master, domain) = active(74);
+            assert_eq!(cycle(domain, Active::send), 0);
+            ecrt_release_master(master);
+        }
+    }
+
+    // covers: c-interface
+    #[test]
+    fn a_failed_handle_that_has_reserved_nothing_leaves_the_bus_to_the_others() {
+        simulate(75);
+        let (master, domain) = active(75);
+        let beside = ecrt_open_master(75);
+        // SAFETY: handles of the library.
+        unsafe {
+            assert_eq!(call(beside, |_| panic!("half changed")), Code::IO.0);
+            ecrt_release_master(beside);
+            assert_eq!(cycle(domain, Active::send), 0);
+            let beside = ecrt_open_master(75);
+            assert!(!beside.is_null());
+            ecrt_release_master(beside);
+            ecrt_release_master(master);
         }
     }
 }

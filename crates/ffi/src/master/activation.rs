@@ -1,10 +1,11 @@
 //! The start of the application of a handle: its declaration, links, times and memory.
 
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use ringcat::{ClockDatagrams, Declaration, DomainId, Instant, LastOutputs, Links};
+use ringcat::{ClockDatagrams, Declaration, DomainId, Error, Instant, LastOutputs, Links};
 
-use super::{CLAIM_LIMIT, END_LIMIT, Master};
+use super::{CLAIM_LIMIT, Master, end_limit};
 use crate::active::{Active, App, Slot};
 use crate::bus::Bus;
 use crate::code::{Code, Outcome, report};
@@ -17,12 +18,12 @@ const MEMORY_GRAIN: usize = 4096;
 
 impl Master {
     /// Takes the links, loads the declaration and starts the application. After an error all of them are as before, so
-    /// that another activation can follow.
+    /// that another activation can follow; once the acyclic half has ended, none can.
     ///
     /// # Errors
     /// [`Code::BUSY`]: an application has the links, or a cyclic call does not end. [`Code::INVALID`]: the declaration
     /// does not fit. [`Code::GONE`]: the acyclic half has ended.
-    pub(super) fn begin(&self, bus: &Bus, draft: &Draft) -> Outcome {
+    pub(super) fn begin(&self, bus: &Arc<Bus>, draft: &Draft) -> Outcome {
         let links = bus.take_links().ok_or(Code::BUSY)?;
         self.is_ring.store(links.addresses().redundant.is_some(), Ordering::Relaxed);
         let supervisor = bus.supervisor().clone();
@@ -36,12 +37,12 @@ impl Master {
                 report(format_args!("master {}: {error}", bus.master()));
                 self.keep_memory(draft, |domain| bus.supervisor().unused_memory(domain));
                 bus.give_links_back(links);
-                return Err(Code::INVALID);
+                return Err(if matches!(error, Error::Gone) { Code::GONE } else { Code::INVALID });
             }
         };
         self.prepare(&mut application, draft);
         let is_followed = self.live.follow(bus, draft.found().len(), self.is_ring());
-        let begun = Active::new(application, self.has_clock.load(Ordering::Relaxed), bus.ownership());
+        let begun = Active::new(application, self.has_clock.load(Ordering::Relaxed), bus.clone());
         let mut begun = Some(begun);
         let placed = is_followed.and_then(|()| {
             self.application.use_within(CLAIM_LIMIT, |slot| {
@@ -52,7 +53,7 @@ impl Master {
         });
         if let (Err(_), Some(Active { mut application, .. })) = (&placed, begun) {
             self.keep_memory(draft, |domain| application.give_memory_back(domain));
-            let ended = match application.deactivate(LastOutputs::Zero, END_LIMIT) {
+            let ended = match application.deactivate(LastOutputs::Zero, end_limit(bus)) {
                 Ok(ended) => ended,
                 Err(refused) => refused.main_device,
             };
@@ -170,7 +171,7 @@ mod tests {
         });
         assert_eq!(master.activate(), Ok(()));
         assert_eq!(kept(&master), 0);
-        master.release();
+        assert_eq!(master.release(), Ok(()));
     }
 
     fn descriptors() -> usize {
@@ -199,7 +200,7 @@ mod tests {
         assert!(descriptors() < before + 100, "{before}, then {}", descriptors());
         spoil(false).expect("nothing is active");
         assert_eq!((master.activate(), kept(&master)), (Ok(()), 0));
-        master.release();
+        assert_eq!(master.release(), Ok(()));
     }
 
     // covers: c-interface
@@ -215,6 +216,6 @@ mod tests {
         assert_eq!(master.look(|draft| draft.domains()[0].memory().is_null()), Ok(true));
         bus.give_links_back(links);
         assert_eq!(master.activate(), Ok(()));
-        master.release();
+        assert_eq!(master.release(), Ok(()));
     }
 }

@@ -1,8 +1,8 @@
 /*
  * realtime own|daemon: cyclic calls beside another thread. The functions that the manual marks as fit for a real-time
- * thread neither allocate nor free, take no lock, and make system calls only for frames; a second caller at the same
- * time gets -EBUSY, and the first one is not disturbed. With "own" receive and send are not counted: the segment that
- * is simulated in this process allocates in them.
+ * thread neither allocate nor free, take no lock that waits, and make system calls only for frames; a second caller at
+ * the same time gets -EBUSY, and the first one is not disturbed. With "own" receive and send are not counted: the
+ * segment that is simulated in this process allocates in them.
  *
  * While it counts, writes to an invalid descriptor mark the parts of the cycle in a trace of system calls: "counted",
  * "frames", "pause". At the end it prints the names of the functions.

@@ -91,6 +91,24 @@ fn each_function_of_the_facts_has_a_comment_with_phases_and_what_it_returns() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+// covers: c-interface
+#[test]
+fn doxygen_makes_the_reference_without_a_warning() {
+    if Command::new("doxygen").arg("--version").output().is_err() {
+        eprintln!("skipped: doxygen is not installed");
+        return;
+    }
+    let to = Path::new(env!("CARGO_TARGET_TMPDIR")).join("c-reference");
+    let _ = std::fs::remove_dir_all(&to);
+    run(Command::new(here().join("reference")).arg(&to));
+    assert!(to.join("index.html").is_file());
+    let page = std::fs::read_to_string(to.join("ecrt_8h.html")).expect("the page of a header");
+    let facts = include_str!("../facts/ecrt_symbol_versions.csv");
+    for (name, _) in facts.lines().skip(1).filter_map(|line| line.split_once(',')) {
+        assert!(page.contains(&format!(">{name}</a>")), "{name}");
+    }
+}
+
 /// On processors with pointers of 32 bits too, for which `ci/cross-examples` compiles it.
 // covers: c-interface
 #[test]

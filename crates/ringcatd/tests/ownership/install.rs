@@ -189,6 +189,25 @@ fn the_prefix_of_the_manual_has_its_bin_sbin_and_etc_init_d() {
 
 // covers: daemon
 #[test]
+fn a_prefix_with_files_of_another_master_is_refused_and_stays_as_it_is() {
+    let root = Root::new();
+    let programs = root.directory.join("programs");
+    let programs = ["--programs", programs.to_str().expect("text"), "--without-library", "--prefix", "/opt/etherlab"];
+    let other = "/opt/etherlab/etc/init.d/ethercat";
+    root.write(other, "of another master\n");
+    let refused = said(&root.run(&programs), false);
+    assert!(refused.contains(&format!("{other} is of another program: remove that, or choose")), "{refused}");
+    assert_eq!(root.files(), BTreeSet::from([other.to_owned()]));
+    assert_eq!(root.text(other), "of another master\n");
+    std::fs::remove_file(root.path(other)).expect("it is there");
+    for _ in 0..2 {
+        said(&root.run(&programs), true);
+    }
+    assert!(root.text(other).contains("ethercatctl"));
+}
+
+// covers: daemon
+#[test]
 fn each_directory_can_be_chosen() {
     let root = Root::new();
     let places = [
