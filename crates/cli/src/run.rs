@@ -25,9 +25,8 @@ use ringcat::config::ObjectNames;
 use ringcat::event_log::EventLog;
 use ringcat::text::{Names, address_of_sender, describe};
 use ringcat::{
-    ActivateError, AliasSource, Application, CyclicThread, Declaration, Ended, Error, Event, Instant, JobProbe,
-    JunctionConnection, JunctionMode, LastOutputs, Links, Options, ProcessData, Scan, SubDeviceId, SupervisorThread,
-    SyncSignals,
+    ActivateError, Application, CyclicThread, Declaration, Ended, Error, Event, Instant, JobProbe, JunctionConnection,
+    JunctionMode, LastOutputs, Links, Options, ProcessData, Scan, SubDeviceId, SupervisorThread, SyncSignals,
 };
 
 use crate::access::{Access, WireLinks};
@@ -143,7 +142,6 @@ fn options(arguments: &RunArguments, network: Option<&ConfiguredNetwork>) -> Opt
         .with_junctions(junctions.map_or(arguments.junction.mode, |(mode, _)| mode))
         .with_enhanced_line_crossed(arguments.enhanced_line_crossed)
         .with_pdos(declared::pdos(network))
-        .with_alias_source(network.map_or_else(AliasSource::default, ConfiguredNetwork::alias_source))
 }
 
 /// How rings behind junctions are handled where the file says it and the command line does not.

@@ -22,7 +22,7 @@ use alloc::vec::Vec;
 use ringcat_wire::sii::{Category, SiiHeader};
 
 pub use crate::direction::Direction;
-pub(crate) use collect::is_possible;
+pub(crate) use collect::{alias_of, is_possible};
 pub(crate) use dictionary::{KnownDictionary, MISSING_BYTES, bytes_of_entry, bytes_of_object, place};
 pub use eeprom::{AliasSource, SiiAssignment};
 pub use extent::SiiExtent;

@@ -41,13 +41,13 @@ pub struct Bus {
     master: u32,
     /// In a child of the process it is not used: its thread is in the parent.
     generation: u64,
-    /// Ends before the acyclic half.
-    _log: BusLog,
+    /// Its lines end before the acyclic half, its files after the bus was given back.
+    log: BusLog,
     supervisor: SupervisorThread,
     /// Links of the cyclic half while no application uses them.
     cyclic_links: Mutex<Option<AnyLinks>>,
     /// Gives the bus back to the daemon that it came from, when it is dropped.
-    _owned: Mutex<Option<OwnedBus>>,
+    owned: Mutex<Option<OwnedBus>>,
     /// Of a bus from a daemon.
     ownership: Option<OwnershipWatch>,
     settings: BusSettings,
@@ -93,6 +93,13 @@ impl TakeError {
         };
         report(format_args!("Failed to reserve master: {text}"));
         code
+    }
+}
+
+impl Drop for Bus {
+    fn drop(&mut self) {
+        self.log.end_lines();
+        drop(locked(&self.owned).take());
     }
 }
 
@@ -206,18 +213,18 @@ impl Bus {
             0 => report_as(priority, format_args!("{line}")),
             _ => report_as(priority, format_args!("master {master}: {line}")),
         });
-        let _log = log.map_err(|error| format!("a thread cannot be started: {error}{}", memory_hint()))?;
+        let log = log.map_err(|error| format!("a thread cannot be started: {error}{}", memory_hint()))?;
         let cyclic_links = Mutex::new(Some(cyclic));
         let generation = generation();
         let (responder, is_reserved) = (Arc::new(Responder::Here(supervisor.clone())), AtomicBool::new(false));
-        let _owned = Mutex::new(owned);
+        let owned = Mutex::new(owned);
         Ok(Bus {
             master,
             generation,
-            _log,
+            log,
             supervisor,
             cyclic_links,
-            _owned,
+            owned,
             ownership,
             settings,
             responder,

@@ -24,8 +24,8 @@ mod application;
 mod bus_log;
 mod error;
 mod ethernet;
-#[cfg(feature = "eoe")]
 mod frame_record;
+#[cfg(feature = "eoe")]
 mod interfaces;
 mod links;
 mod orders;
@@ -34,6 +34,7 @@ mod ownership;
 mod query_threads;
 mod received;
 mod receiver;
+mod record_files;
 mod refusing;
 pub mod serving;
 mod settings;
@@ -42,7 +43,7 @@ mod tool;
 pub use application::socket;
 pub use bus_log::{BusLog, Followed, Lines, OperatorLines, Priority};
 pub use error::DaemonError;
-pub use frame_record::{FrameRecord, RecordReason};
+pub use frame_record::{FrameRecord, LastWritten, RecordError, RecordReason};
 pub use links::{DaemonLinks, adopt_links};
 pub use owned::OwnedBus;
 pub use ownership::{Ownership, OwnershipWatch};

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use ringcat::daemon::{
-    BusLog, BusSettings, Followed, FrameRecord, Lines, RecordReason, adopt_links, options_with, serving,
+    BusLog, BusSettings, Followed, FrameRecord, LastWritten, Lines, RecordReason, adopt_links, options_with, serving,
 };
 use ringcat::eoe::{Ethernet, EthernetEvent, EthernetOptions};
 use ringcat::foreign::{ListeningPhase, ListeningState, QuietLinks};
@@ -42,6 +42,8 @@ pub struct Lasting<'a> {
     pub knowledge: &'a [u8],
     /// What was printed of the bus before.
     pub lines: Arc<Mutex<Lines>>,
+    /// When frames before a fault were written last.
+    pub last_written: LastWritten,
     /// Level of messages.
     pub debug_level: u32,
     /// What holds for whatever drives the master.
@@ -164,7 +166,7 @@ fn recorded<L: Links>(
     let names = opened.links().names();
     let taps = Taps::new(names.len());
     let record = FrameRecord::start(&taps, lasting.number, names, ring.clone());
-    let mut record = record.map_err(|error| error.to_string())?;
+    let mut record = record.map_err(|error| error.to_string())?.with_last_written(lasting.last_written.clone());
     if handover == Handover::AfterCrash && !lasting.knowledge.is_empty() {
         record.note(RecordReason::OwnerLost, Instant::now());
     }

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use ringcat::daemon::{Lines, serving};
+use ringcat::daemon::{LastWritten, Lines, serving};
 use ringcat::{AlState, Handover, Knowledge};
 use ringcat_control::message::{Answer, HandedBus, MasterState, Query, ToolAnswer, ToolQuery};
 use ringcat_control::{BusSettings, Content, Message, Refusal};
@@ -71,6 +71,8 @@ pub struct Master {
     knowledge: Mutex<Vec<u8>>,
     /// What was printed of the bus.
     lines: Arc<Mutex<Lines>>,
+    /// When frames before a fault were written last.
+    last_written: LastWritten,
     /// Level of messages, whatever drives the master.
     debug_level: AtomicU32,
     /// What holds for whatever drives it.
@@ -140,6 +142,7 @@ impl Master {
             interfaces: interfaces.map(Arc::new),
             knowledge: Mutex::default(),
             lines: Arc::default(),
+            last_written: LastWritten::default(),
             debug_level: AtomicU32::new(debug_level),
             bus,
             others: Others::new(number, is_shared),
@@ -422,8 +425,9 @@ impl Master {
         let (lines, debug_level) = (self.lines.clone(), self.debug_level.load(Ordering::Acquire));
         let interfaces = self.interfaces.clone();
         let listened = self.others.listened();
-        let (number, settings) = (self.number, &self.bus);
-        let lasting = Lasting { number, knowledge: &knowledge, lines, debug_level, settings, interfaces, listened };
+        let (number, settings, last_written) = (self.number, &self.bus, self.last_written.clone());
+        let knowledge = &knowledge[..];
+        let lasting = Lasting { number, knowledge, lines, last_written, debug_level, settings, interfaces, listened };
         let driving = Driving::start(&opened, &lasting, handover)?;
         for absent in opened.absent() {
             say(format_args!("master {}: interface {absent} is not there; the ring goes on without it", self.number));

@@ -10,7 +10,7 @@ use ringcat::eni::{EniFile, EniImage, EniVariable, VariableType};
 use ringcat::network::{LoadedNetwork, NetworkFile};
 use ringcat::text::Names;
 use ringcat::{
-    ActivateError, AliasSource, Declaration, Direction, Error, JunctionConnection, JunctionMode, Scan, StationAddress,
+    ActivateError, Declaration, Direction, Error, JunctionConnection, JunctionMode, Scan, StationAddress,
     SubDeviceConfig, SubDeviceId, SubDeviceInfo,
 };
 
@@ -139,14 +139,6 @@ impl ConfiguredNetwork {
             return Err(Failure::new("the file declares a ring (redundancy.ring): expected --redundant IF"));
         }
         Ok(())
-    }
-
-    /// Where aliases are read: commands of an ENI read the register.
-    pub fn alias_source(&self) -> AliasSource {
-        match &self.file {
-            FileOfNetwork::Eni { .. } => AliasSource::Register,
-            FileOfNetwork::Network(_) => AliasSource::Sii,
-        }
     }
 
     /// How rings behind junctions are handled, where the file says it.

@@ -43,9 +43,7 @@ pub(super) fn collect(readout: Readout, header: &SiiHeader, parts: &[Category<'_
     if readout.alias_source == AliasSource::Register {
         info.alias = readout.alias;
     }
-    // The reserved words behind them are not read.
-    let bytes = &header.encode()[..READ_BYTES];
-    if [0x00, 0xFF].iter().any(|erased| bytes.iter().all(|byte| byte == erased)) {
+    if is_erased(header) {
         info.warnings.push(InfoWarning { category: None, offset: None, problem: SiiProblem::Blank });
         return info;
     }
@@ -71,6 +69,17 @@ pub(super) fn collect(readout: Readout, header: &SiiHeader, parts: &[Category<'_
     }
     sync_managers::check_completeness(&mut info, &parts);
     info
+}
+
+/// The alias of an SII; an erased one has none.
+pub(crate) fn alias_of(header: &SiiHeader) -> u16 {
+    if is_erased(header) { 0 } else { header.alias }
+}
+
+/// Whether all words are erased. The reserved ones behind them are not read.
+fn is_erased(header: &SiiHeader) -> bool {
+    let bytes = &header.encode()[..READ_BYTES];
+    [0x00, 0xFF].iter().any(|erased| bytes.iter().all(|byte| byte == erased))
 }
 
 fn collect_header(info: &mut SubDeviceInfo, header: &SiiHeader) {

@@ -9,9 +9,9 @@
 #[non_exhaustive]
 pub enum AliasSource {
     /// Word 4 of the SII: what was written last. Without a readable SII there is no alias.
-    #[default]
     Sii,
     /// Register STATION_ALIAS (0x0012).
+    #[default]
     Register,
 }
 

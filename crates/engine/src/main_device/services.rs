@@ -277,7 +277,7 @@ impl MainDevice {
             let written = program::write(&bus, station, &image, force).await;
             cache.clear();
             if let (Ok(_), Some(key), Some(header)) = (&written, key, image.first_chunk()) {
-                let alias = SiiHeader::decode(header).alias;
+                let alias = crate::info::alias_of(&SiiHeader::decode(header));
                 segment.observe(Observation::MoreRead { key, more: More::Alias(alias) });
             }
             written

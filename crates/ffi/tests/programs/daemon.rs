@@ -11,7 +11,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use ringcat::AlState;
-use ringcat::daemon::BusSettings;
+use ringcat::daemon::{BusSettings, Client, Query};
 use ringcat::esi::load_segment;
 use ringcat::piped::segment::PipedSegment;
 use ringcat::sim::cable::HostLink;
@@ -183,6 +183,12 @@ impl Bench {
         let stalls = self.seen.stalls.lock().expect("no panic");
         let first = before_ns.saturating_sub(time.as_nanos() as u64);
         stalls.iter().any(|(end, stood)| *stood >= length && (first..before_ns).contains(end))
+    }
+
+    /// Asks the daemon, as a tool does.
+    pub fn ask(&self, what: Query) {
+        let mut client = Client::connect(&self.socket, "test").expect("it is there");
+        client.ask_patiently(0, &what, &[]).expect("it is answered");
     }
 
     pub fn command(&self, program: &Path) -> Command {

@@ -22,15 +22,9 @@ fn written(directory: &Path, reason: &str) -> PathBuf {
     loop {
         let entries = std::fs::read_dir(directory).expect("it is there").flatten();
         let mut paths = entries.map(|it| it.path());
-        // A file is complete when it does not grow any more.
-        let found = paths.find(|it| it.to_string_lossy().ends_with(&format!("-{reason}.pcapng")));
-        if let Some(path) = found {
-            let size = || std::fs::metadata(&path).map_or(0, |data| data.len());
-            let before = size();
-            std::thread::sleep(Duration::from_millis(200));
-            if before > 0 && size() == before {
-                return path;
-            }
+        // A file has its name when it is complete.
+        if let Some(path) = paths.find(|it| it.to_string_lossy().ends_with(&format!("-{reason}.pcapng"))) {
+            return path;
         }
         assert!(begin.elapsed() < LONG, "there is no file: {reason}");
         std::thread::sleep(Duration::from_millis(10));
@@ -69,23 +63,29 @@ fn a_fault_writes_the_frames_of_the_last_seconds() {
     std::fs::write(&segment, SEGMENT).expect("it can be written");
     let mut settings = BusSettings::default();
     (settings.debug_ring.is_on, settings.debug_ring.directory) = (true, directory.clone());
+    settings.debug_ring.cycles = 100_000;
     let bench = Bench::start_with(&segment, "record", settings);
     let mut command = bench.command(&program);
     let mut child = command.args(["2000", "once"]).stdin(Stdio::piped()).spawn().expect("it runs");
     let _lines = wait_for_line(&mut child, "op");
     std::thread::sleep(Duration::from_millis(500));
-    assert_eq!(std::fs::read_dir(&directory).expect("it is there").count(), 0, "there was no fault");
+    // A busy machine may stop for 100 ms, which is a fault of a domain; no SubDevice is lost by that.
+    let names = || {
+        let entries = std::fs::read_dir(&directory).expect("it is there").flatten();
+        entries.map(|it| it.file_name().to_string_lossy().into_owned()).collect::<Vec<_>>()
+    };
+    assert!(!names().iter().any(|name| name.contains("lost")), "nothing was lost: {:?}", names());
     bench.inside(|segment| segment.network_mut().apply(Fault::PowerOff(DeviceIndex(3))));
-    let entries = |directory: &Path| std::fs::read_dir(directory).expect("it is there").count();
     let begin = Instant::now();
-    while entries(&directory) == 0 {
+    let first = loop {
+        if let Some(name) = names().into_iter().find(|name| name.ends_with(".pcapng")) {
+            break name;
+        }
         assert!(begin.elapsed() < LONG, "there is no file");
         std::thread::sleep(Duration::from_millis(10));
-    }
-    let first = std::fs::read_dir(&directory).expect("it is there").flatten().next().expect("there is one").path();
-    let name = first.to_string_lossy().into_owned();
-    let reason = ["lost", "working-counter"].into_iter().find(|reason| name.ends_with(&format!("-{reason}.pcapng")));
-    check(&written(&directory, reason.expect(&name)));
+    };
+    let reason = ["lost", "working-counter"].into_iter().find(|reason| first.ends_with(&format!("-{reason}.pcapng")));
+    check(&written(&directory, reason.expect(&first)));
     let before = bench.connected_ns();
     child.kill().expect("it runs");
     child.wait().expect("it has ended");

@@ -2,11 +2,15 @@
 //! of a daemon, which a program gets with its bus.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
+use std::time::Duration;
 
-use ringcat::daemon::BusSettings;
+use ringcat::daemon::known::ToolQuery;
+use ringcat::daemon::{BusSettings, Query};
+use ringcat::sim::cable::DeviceIndex;
+use ringcat::sim::fault::Fault;
 
-use crate::daemon::Bench;
+use crate::daemon::{Bench, wait_for_line};
 use crate::library::{here, program, workshop};
 
 /// Two SubDevices of one kind, the second one with an alias.
@@ -42,8 +46,6 @@ fn variables_of_a_program_with_links_of_its_own_are_switches() {
         assert_eq!(run(&[], place).as_deref(), Ok(MISSING), "{place:?}");
         assert_eq!(run(&[("RINGCAT_WILDCARDS", "yes")], place).as_deref(), Ok(FOUND), "{place:?}");
     }
-    let both = [("RINGCAT_WILDCARDS", "yes"), ("RINGCAT_REGALIAS", "yes"), ("RINGCAT_SII_ASSIGN", "yes")];
-    assert_eq!(run(&both, ["7", "0", ANY, ANY]).as_deref(), Ok(FOUND));
     let wrong = run(&[("RINGCAT_REGALIAS", "1")], ["0", "1", ANY, ANY]).expect_err("the variable is wrong");
     assert!(wrong.contains("RINGCAT_REGALIAS: expected yes or no, got \"1\""), "{wrong}");
 }
@@ -62,4 +64,44 @@ fn a_program_has_the_settings_of_its_daemon() {
     // The variables of the program do not count beside a daemon.
     let mut command = plain.command(&switches);
     assert_eq!(said(command.env("RINGCAT_WILDCARDS", "yes"), ["7", "0", ANY, "own"]).as_deref(), Ok(MISSING));
+}
+
+// covers: c-interface, daemon, eeprom
+#[test]
+fn an_alias_that_was_written_counts_at_once_or_stays_that_of_the_register() {
+    let Some(switches) = program(&here().join("tests/c/switches.c"), &[]) else { return };
+    let segment = segment("alias");
+    for (reads_alias_register, expected) in [(false, "alias 9, operational\n"), (true, "alias 7, operational\n")] {
+        let mut settings = BusSettings::default();
+        settings.reads_alias_register = reads_alias_register;
+        let bench = Bench::start_with(&segment, &format!("alias-{reads_alias_register}"), settings);
+        bench.ask(Query::Tool(ToolQuery::AliasWrite { position: 1, alias: 9, force: false }));
+        let alias = if reads_alias_register { "7" } else { "9" };
+        let said = said(&mut bench.command(&switches), [alias, "0", "own", "own"]);
+        assert_eq!(said.as_deref(), Ok(expected), "register: {reads_alias_register}");
+    }
+}
+
+// covers: c-interface, daemon
+#[test]
+fn without_rt_syslog_no_line_is_about_a_working_counter() {
+    let Some(program) = program(&here().join("tests/c/lossless.c"), &[]) else { return };
+    let segment = segment("lines");
+    for prints_cyclic_lines in [true, false] {
+        let mut settings = BusSettings::default();
+        settings.prints_cyclic_lines = prints_cyclic_lines;
+        let bench = Bench::start_with(&segment, &format!("lines-{prints_cyclic_lines}"), settings);
+        let mut command = bench.command(&program);
+        let command = command.args(["2000", "once"]).stdin(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().expect("it runs");
+        let _lines = wait_for_line(&mut child, "op");
+        bench.inside(|segment| segment.network_mut().apply(Fault::PowerOff(DeviceIndex(1))));
+        std::thread::sleep(Duration::from_secs(3));
+        child.kill().expect("it runs");
+        let output = child.wait_with_output().expect("it has ended");
+        let text = String::from_utf8_lossy(&output.stderr);
+        // The SubDevice that is gone is seen without a cyclic line, too.
+        assert!(text.contains("slave(s)"), "{text}");
+        assert_eq!(text.contains("orking counter"), prints_cyclic_lines, "{text}");
+    }
 }

@@ -85,6 +85,8 @@ impl Followed {
 #[derive(Debug)]
 pub struct BusLog {
     end: Option<Sender<()>>,
+    /// Closed once all lines about the bus are printed.
+    ended: Mutex<Receiver<()>>,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -98,13 +100,21 @@ impl BusLog {
         prepare: impl FnOnce() + Send + 'static,
         print: impl FnMut(Priority, &str) + Send + 'static,
     ) -> std::io::Result<BusLog> {
-        let (end, ends) = channel();
+        let ((end, ends), (ending, ended)) = (channel(), channel());
         let body = move || {
             prepare();
-            run(&followed, &ends, print);
+            run(&followed, &ends, ending, print);
         };
         let thread = std::thread::Builder::new().name("bus log".into()).stack_size(STACK_BYTES).spawn(body)?;
-        Ok(BusLog { end: Some(end), thread: Some(thread) })
+        Ok(BusLog { end: Some(end), ended: Mutex::new(ended), thread: Some(thread) })
+    }
+
+    /// Ends and waits for the last lines about the bus, not for frames that are still written into a file. The bus can
+    /// be given back then.
+    pub fn end_lines(&mut self) {
+        self.end = None;
+        // Nothing is sent: the thread drops the other end.
+        let _ = self.ended.get_mut().unwrap_or_else(PoisonError::into_inner).recv();
     }
 
     /// Ends without waiting for the last lines, which may still come for a moment.
@@ -123,7 +133,7 @@ impl Drop for BusLog {
     }
 }
 
-fn run(followed: &Followed, ends: &Receiver<()>, mut print: impl FnMut(Priority, &str)) {
+fn run(followed: &Followed, ends: &Receiver<()>, ending: Sender<()>, mut print: impl FnMut(Priority, &str)) {
     let Followed { supervisor, ownership, lines, with_cyclic, record } = followed;
     let (mut looks, mut next_message) = (0_u32, 0);
     loop {
@@ -146,16 +156,15 @@ fn run(followed: &Followed, ends: &Receiver<()>, mut print: impl FnMut(Priority,
         let mut all = lines.pop();
         drop(lines);
         if let Some(record) = &mut record {
-            let now = Instant::now();
-            all.extend(record.look(now, supervisor.observer().is_some()));
-            if is_last {
-                all.extend(record.end(now));
-            }
+            all.extend(record.look(Instant::now(), supervisor.observer().is_some()));
         }
         for (priority, line) in all {
             print(priority, &line);
         }
         if is_last {
+            drop(ending);
+            let lines = record.map(|mut record| record.end(Instant::now()));
+            lines.into_iter().flatten().for_each(|(priority, line)| print(priority, &line));
             return;
         }
     }

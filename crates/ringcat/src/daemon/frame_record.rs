@@ -5,12 +5,11 @@
 //! cyclic path copies a frame into the queue of its tap, and does nothing else.
 
 use std::collections::BTreeMap;
-use std::fs::OpenOptions;
-use std::io::BufWriter;
-use std::os::unix::fs::OpenOptionsExt;
-use std::path::{Path, PathBuf};
+use std::convert::Infallible;
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 use ringcat_control::settings::DebugRing;
 use ringcat_engine::domain::DomainState;
@@ -19,54 +18,20 @@ use ringcat_link::operator::Priority;
 use ringcat_link::recorder::{FrameReader, FrameRing};
 use ringcat_link::{AlreadyRead, Taps};
 
+use super::record_files::RecordFiles;
+pub use super::record_files::RecordReason;
+
 /// Frames of this time behind a fault are in its file.
 const AFTER: Duration = Duration::from_millis(200);
 /// After a file faults cause no other one for this time.
 const PAUSE: Duration = Duration::from_secs(10);
 /// A domain that stays incomplete for this time is a fault, however many cycles that are.
 const INTERRUPTION: Duration = Duration::from_millis(100);
-/// Only the user of the process and its group read what was on the bus.
-const MODE: u32 = 0o640;
 /// What the interfaces are to the MainDevice.
 const DESCRIPTIONS: [&str; 2] = ["main link", "redundant link"];
 
 /// A line for the operator.
 type Line = (Priority, String);
-
-/// Why a file is written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum RecordReason {
-    /// A SubDevice no longer answers.
-    Lost,
-    /// A SubDevice has left its state without a request.
-    StateLeft,
-    /// A domain was incomplete for too many cycles.
-    WorkingCounter,
-    /// An interface has lost its carrier.
-    LinkDown,
-    /// The daemon has taken the bus back.
-    TakenBack,
-    /// The application has ended without a release, or was stopped.
-    OwnerLost,
-    /// A command.
-    Command,
-}
-
-impl RecordReason {
-    /// In the name of a file.
-    const fn word(self) -> &'static str {
-        match self {
-            RecordReason::Lost => "lost",
-            RecordReason::StateLeft => "state-left",
-            RecordReason::WorkingCounter => "working-counter",
-            RecordReason::LinkDown => "link-down",
-            RecordReason::TakenBack => "taken-back",
-            RecordReason::OwnerLost => "owner-lost",
-            RecordReason::Command => "command",
-        }
-    }
-}
 
 /// What is known of the working counter of a domain.
 #[derive(Clone, Copy, Debug, Default)]
@@ -75,42 +40,87 @@ struct Counted {
     incomplete_since: Option<Instant>,
 }
 
+/// When a file of a master was written last: it outlasts the records of those that drive it in turn.
+#[derive(Clone, Debug, Default)]
+pub struct LastWritten(Arc<Mutex<Option<Instant>>>);
+
+impl LastWritten {
+    fn at(&self) -> Option<Instant> {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn set(&self, now: Instant) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(now);
+    }
+}
+
+/// Why the last frames cannot be recorded.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub enum RecordError {
+    /// Something else reads the taps.
+    AlreadyRead(AlreadyRead),
+    /// There is not so much memory, in bytes.
+    Memory(u64),
+}
+
+impl fmt::Display for RecordError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            RecordError::AlreadyRead(error) => error.fmt(f),
+            RecordError::Memory(bytes) => write!(f, "there is no memory for 2 * {bytes} bytes of frames"),
+        }
+    }
+}
+
+impl std::error::Error for RecordError {}
+
 /// A recording of the last seconds that goes on until it is dropped.
 #[derive(Debug)]
 pub struct FrameRecord {
     reader: FrameReader,
     ring: FrameRing,
+    /// Takes the place of `ring` while that is written.
+    spare: Option<FrameRing>,
     settings: DebugRing,
     master: u32,
     names: Vec<String>,
     domains: BTreeMap<usize, Counted>,
     /// A fault, and when its file is written.
     due: Option<(RecordReason, Instant)>,
-    written_at: Option<Instant>,
-    writing: Option<JoinHandle<Line>>,
+    last_written: LastWritten,
+    writing: Option<JoinHandle<(Line, FrameRing)>>,
 }
 
 impl FrameRecord {
-    /// Begins to record what these taps see of interfaces with these names.
+    /// Begins to record what these taps see of interfaces with these names. All memory is reserved here: two rings, of
+    /// which one is written while the other one goes on.
     ///
     /// # Errors
-    /// Something else reads the taps.
+    /// Something else reads the taps, or there is not so much memory.
     pub fn start(
         taps: &Taps,
         master: u32,
         names: Vec<String>,
         settings: DebugRing,
-    ) -> Result<FrameRecord, AlreadyRead> {
-        let reader = taps.read()?;
-        let ring = FrameRing::new(settings.bytes as usize, Duration::from_secs(settings.seconds.into()));
-        let (domains, due, written_at, writing) = (BTreeMap::new(), None, None, None);
-        Ok(FrameRecord { reader, ring, settings, master, names, domains, due, written_at, writing })
+    ) -> Result<FrameRecord, RecordError> {
+        let (ring, spare) = (empty_ring(&settings)?, Some(empty_ring(&settings)?));
+        let reader = taps.read().map_err(RecordError::AlreadyRead)?;
+        let (domains, due, last_written, writing) = (BTreeMap::new(), None, LastWritten::default(), None);
+        Ok(FrameRecord { reader, ring, spare, settings, master, names, domains, due, last_written, writing })
     }
 
-    /// Takes the frames that have waited.
+    /// Goes on behind a file of another record of this master.
+    #[must_use]
+    pub fn with_last_written(mut self, last_written: LastWritten) -> FrameRecord {
+        self.last_written = last_written;
+        self
+    }
+
+    /// Takes the frames that have waited for a while: those of all threads are in the order of their times then.
     pub(super) fn take_frames(&mut self) {
         let ring = &mut self.ring;
-        let taken: Result<(), std::convert::Infallible> = self.reader.read(|note, frame| {
+        let taken: Result<(), Infallible> = self.reader.read(|note, frame| {
             ring.push(note, frame);
             Ok(())
         });
@@ -119,10 +129,22 @@ impl FrameRecord {
         }
     }
 
-    /// A file is written soon, unless one was written a moment ago; a command is followed in any case.
+    /// Takes all frames, also the newest ones.
+    fn take_all_frames(&mut self) {
+        let ring = &mut self.ring;
+        let taken: Result<(), Infallible> = self.reader.read_all(|note, frame| {
+            ring.push(note, frame);
+            Ok(())
+        });
+        match taken {
+            Ok(()) => {}
+        }
+    }
+
+    /// A file is written soon, unless one was written a moment ago.
     pub fn note(&mut self, reason: RecordReason, now: Instant) {
-        let is_soon = self.written_at.is_some_and(|at| now.duration_since(at) < PAUSE);
-        if self.due.is_none() && (reason == RecordReason::Command || !is_soon) {
+        let is_soon = self.last_written.at().is_some_and(|at| now.duration_since(at) < PAUSE);
+        if self.due.is_none() && !is_soon {
             self.due = Some((reason, now + AFTER));
         }
     }
@@ -163,8 +185,7 @@ impl FrameRecord {
         match self.due {
             Some((reason, at)) if at <= now && self.writing.is_none() => {
                 self.due = None;
-                self.written_at = Some(now);
-                lines.extend(self.write(reason));
+                lines.extend(self.write(reason, now));
             }
             _ => {}
         }
@@ -175,8 +196,7 @@ impl FrameRecord {
     pub(super) fn end(&mut self, now: Instant) -> Vec<Line> {
         let mut lines: Vec<Line> = self.wait().into_iter().collect();
         if let Some((reason, _)) = self.due.take() {
-            self.written_at = Some(now);
-            lines.extend(self.write(reason));
+            lines.extend(self.write(reason, now));
         }
         lines.extend(self.wait());
         lines
@@ -184,18 +204,30 @@ impl FrameRecord {
 
     /// Waits for the thread that writes.
     fn wait(&mut self) -> Option<Line> {
-        // The panic handler has reported a panic of the thread.
-        self.writing.take()?.join().ok()
+        // The panic handler has reported a panic of the thread; its ring is gone.
+        let (line, mut ring) = self.writing.take()?.join().ok()?;
+        ring.clear();
+        self.spare = Some(ring);
+        Some(line)
     }
 
     /// Writes in a thread of its own; the line that there is none.
-    fn write(&mut self, reason: RecordReason) -> Option<Line> {
-        let ring = self.ring.take();
+    fn write(&mut self, reason: RecordReason, now: Instant) -> Option<Line> {
+        self.last_written.set(now);
+        self.take_all_frames();
+        let fails =
+            |error: &dyn fmt::Display| (Priority::Error, format!("The last frames cannot be written: {error}."));
+        let spare = match self.spare.take().map_or_else(|| empty_ring(&self.settings), Ok) {
+            Ok(spare) => spare,
+            Err(error) => return Some(fails(&error)),
+        };
+        let ring = std::mem::replace(&mut self.ring, spare);
         let (master, names, settings) = (self.master, self.names.clone(), self.settings.clone());
         let lost: u64 = (0..names.len()).map(|interface| self.reader.lost(interface)).sum();
         let body = move || {
             let names: Vec<(&str, &str)> = names.iter().map(String::as_str).zip(DESCRIPTIONS).collect();
-            match save(&ring, (master, reason), &names, &settings) {
+            let files = RecordFiles { directory: &settings.directory, master, most: settings.files };
+            let line = match files.save(reason, |out| ring.write(out, &names)) {
                 Ok(path) => {
                     let lacking =
                         if lost == 0 { String::new() } else { format!(", {lost} since the start are not recorded") };
@@ -206,49 +238,24 @@ impl FrameRecord {
                     let place = settings.directory.display();
                     (Priority::Error, format!("The last frames cannot be written in {place}: {error}."))
                 }
-            }
+            };
+            (line, ring)
         };
         match std::thread::Builder::new().name("record".into()).spawn(body) {
             Ok(writing) => {
                 self.writing = Some(writing);
                 None
             }
-            Err(error) => Some((Priority::Error, format!("The last frames cannot be written: {error}."))),
+            Err(error) => Some(fails(&error)),
         }
     }
 }
 
-/// Writes the frames into a new file, after old files have made room for it.
-fn save(
-    ring: &FrameRing,
-    (master, reason): (u32, RecordReason),
-    names: &[(&str, &str)],
-    settings: &DebugRing,
-) -> std::io::Result<PathBuf> {
-    let begin = format!("ringcat-{master}-");
-    make_room(&settings.directory, &begin, settings.files)?;
-    // A clock before 1970 was never set.
-    let at_ms = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |at| at.as_millis());
-    let path = settings.directory.join(format!("{begin}{at_ms:013}-{}.pcapng", reason.word()));
-    let file = OpenOptions::new().write(true).create_new(true).mode(MODE).open(&path)?;
-    ring.write(BufWriter::with_capacity(1 << 18, file), names)?;
-    Ok(path)
-}
-
-/// Removes the oldest files of this master, so that with another one there are at most `most`.
-fn make_room(directory: &Path, begin: &str, most: u32) -> std::io::Result<()> {
-    let mut old: Vec<PathBuf> = Vec::new();
-    for entry in std::fs::read_dir(directory)? {
-        let entry = entry?;
-        let name = entry.file_name();
-        let is_ours = name.to_str().is_some_and(|it| it.starts_with(begin) && it.ends_with(".pcapng"));
-        if is_ours && entry.file_type()?.is_file() {
-            old.push(entry.path());
-        }
-    }
-    old.sort_unstable();
-    let surplus = (old.len() + 1).saturating_sub(most as usize);
-    old.iter().take(surplus).try_for_each(std::fs::remove_file)
+/// The memory for frames.
+fn empty_ring(settings: &DebugRing) -> Result<FrameRing, RecordError> {
+    let memory = |_| RecordError::Memory(settings.bytes);
+    let bytes = usize::try_from(settings.bytes).map_err(|_| RecordError::Memory(settings.bytes))?;
+    FrameRing::new(bytes, Duration::from_secs(settings.seconds.into())).map_err(memory)
 }
 
 #[cfg(test)]
@@ -256,6 +263,8 @@ mod tests {
     use ringcat_engine::declared::SubDeviceId;
     use ringcat_engine::domain::{DomainId, DomainStatus};
     use ringcat_link::pcapng::Direction;
+
+    use std::path::PathBuf;
 
     use super::*;
 
@@ -304,13 +313,12 @@ mod tests {
         let begin = Instant::now();
         tap.record(0, Direction::Out, 1_000, &[0x11; 60]);
         record.take_frames();
-        record.take_frames();
         record.take(&Event::Lost { subdevice: SubDeviceId(0) }, begin);
         assert_eq!(record.look(begin, true), []);
         tap.record(0, Direction::In, 2_000, &[0x22; 60]);
-        record.take_frames();
-        record.take_frames();
-        assert_eq!((record.look(begin + AFTER, true), place.files().len()), (Vec::new(), 0));
+        let early = begin + AFTER - Duration::from_millis(1);
+        assert_eq!((record.look(early, true), place.files().len()), (Vec::new(), 0));
+        assert_eq!(record.look(begin + AFTER, true), []);
         let lines = record.end(begin + AFTER);
         let [(_, text)] = &lines[..] else { panic!("{lines:?}") };
         let [file] = &place.files()[..] else { panic!("{:?}", place.files()) };
@@ -348,7 +356,7 @@ mod tests {
     fn files_are_at_most_so_many_and_not_one_after_the_other() {
         let place = Place::new("room");
         std::fs::write(place.0.join("ringcat-01-other.pcapng"), []).expect("it can be written");
-        let taps = Taps::new(1);
+        let (taps, taps_of_next) = (Taps::new(1), Taps::new(1));
         let mut record = place.record(&taps, 2);
         let mut now = Instant::now();
         for round in 0..4 {
@@ -356,8 +364,9 @@ mod tests {
             assert_eq!(record.end(now).len(), 1, "{round}");
             record.note(RecordReason::LinkDown, now + Duration::from_secs(1));
             assert_eq!(record.due, None, "a moment after a file");
-            record.note(RecordReason::Command, now + Duration::from_secs(1));
-            assert_eq!(record.due.take().map(|(reason, _)| reason), Some(RecordReason::Command));
+            let mut next = place.record(&taps_of_next, 2).with_last_written(record.last_written.clone());
+            next.note(RecordReason::OwnerLost, now + Duration::from_secs(1));
+            assert_eq!(next.due, None, "a moment after a file of the one before");
             now += PAUSE;
             std::thread::sleep(Duration::from_millis(2));
         }

@@ -210,3 +210,18 @@ fn a_written_alias_counts_at_once_in_the_sii_and_after_power_on_in_the_register(
         }
     }
 }
+
+// covers: 4.1, eeprom
+#[test]
+fn an_erased_sii_that_is_written_with_force_has_no_alias() {
+    const AT: usize = 1;
+    let options = Options::default().with_alias_source(AliasSource::Sii).with_idle_operation(true);
+    let segment = "[[device]]\ntype = \"digital-output-8\"\ncount = 3\n";
+    let links = SimulatedSegment::from_toml(segment).expect("it is right");
+    let mut main_device = MainDevice::request(links, &options);
+    assert_eq!(main_device.scan().expect("a scan").subdevices[AT].alias, 0);
+    main_device.subdevice(Position(AT as u16)).write_alias(77, false).expect("it is written");
+    assert_eq!(main_device.subdevices()[AT].alias, 77);
+    main_device.subdevice(Position(AT as u16)).sii_write(vec![0xFF; 256], true).expect("it is written");
+    assert_eq!(main_device.subdevices()[AT].alias, 0, "0xFFFF of an erased EEPROM is no alias");
+}
