@@ -140,7 +140,11 @@ pub fn rows(tree: &Tree, packet: &str) -> Result<Vec<Row>, Finding> {
         polling(tree),
         none("words for people outside of the allow-list", "1,361", words::for_people(tree)),
         printed("lines of the engine, and without files of tests", BEFORE.engine_lines, engine_lines),
-        printed("public items of `ringcat` (now with fields, variants and crates handed on)", BEFORE.public_items, public_items.to_string()),
+        printed(
+            "public items of `ringcat` (now with fields, variants and crates handed on)",
+            BEFORE.public_items,
+            public_items.to_string(),
+        ),
         Row {
             what: "documentation examples",
             before: BEFORE.examples,
