@@ -3,14 +3,12 @@
 
 # What tests and benches use beyond the compiler: valgrind counts instructions, iproute2 makes the network namespaces
 # that tests on real interfaces run in, tshark reads captures, strace counts system calls, pkg-config finds the library
-# that was installed, ethercatctl needs procps. CMake, lintian, mandoc, groff, shellcheck, zsh and fish read the files
-# of packages that are made for them. Packages are installed on the machine of CI only; apt-get takes about half a
-# minute.
+# that was installed, ethercatctl needs procps. Packages are installed on the machine of CI only; apt-get takes about
+# half a minute.
 root_layer() {
     local missing=() tool
     declare -A package=([valgrind]=valgrind [ip]=iproute2 [tshark]=tshark [strace]=strace [pkg-config]=pkg-config
-        [ps]=procps [cmake]=cmake [lintian]=lintian [mandoc]=mandoc [groff]=groff-base [shellcheck]=shellcheck
-        [zsh]=zsh [fish]=fish [dpkg-source]=dpkg-dev)
+        [ps]=procps)
     for tool in "${!package[@]}"; do
         command -v "$tool" >/dev/null || missing+=("${package[$tool]}")
     done
@@ -24,8 +22,32 @@ root_layer() {
         return 1
     else
         echo "skipped: not installed: ${missing[*]}; without valgrind instruction counts are missing, without iproute2"
-        echo "the tests on real interfaces, without tshark its view of captures; the others check files of the packages"
-        echo "(apt-get install brings them; this script does so only as root with CI=true)"
+        echo "the tests on real interfaces, without tshark its view of captures (apt-get install brings them; this"
+        echo "script does so only as root with CI=true)"
+    fi
+    readers_of_packages
+}
+
+# What reads the files of packages that are made for it, where apt-get has it. The checks that need one say if they are
+# skipped.
+readers_of_packages() {
+    local tool missing=()
+    declare -A package=([cmake]=cmake [lintian]=lintian [mandoc]=mandoc [groff]=groff-base [shellcheck]=shellcheck
+        [zsh]=zsh [fish]=fish [dpkg-source]=dpkg-dev)
+    for tool in "${!package[@]}"; do
+        ! command -v "$tool" >/dev/null || continue
+        missing+=("${package[$tool]}")
+    done
+    [[ ${#missing[@]} != 0 ]] || return 0
+    if [[ ${CI:-} == true && $(id -u) == 0 ]]; then
+        apt-get update -q || true
+        # One by one: apt-get installs nothing if it does not know one of several.
+        for tool in "${missing[@]}"; do
+            DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends "$tool" ||
+                echo "apt-get cannot install $tool: checks that need it are skipped"
+        done
+    else
+        echo "not installed: ${missing[*]}: checks of files of the packages that need them are skipped"
     fi
 }
 

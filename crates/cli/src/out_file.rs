@@ -1,7 +1,7 @@
 //! A file that a command makes: what exists is replaced with `--overwrite` only.
 
-use std::fs::{self, OpenOptions};
-use std::io::Write;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Write};
 use std::path::Path;
 
 use clap::Args;
@@ -19,7 +19,7 @@ pub struct Overwrite {
 impl Overwrite {
     /// Refuses a file that exists, before the command does its work.
     pub fn check(self, out: &Path) -> Result<(), Failure> {
-        match !self.overwrite && fs::symlink_metadata(out).is_ok() {
+        match !self.overwrite && Target::of(out) == Target::File {
             true => Err(Failure::new(format!("{} exists: name another file, or add --overwrite", out.display()))),
             false => Ok(()),
         }
@@ -27,9 +27,42 @@ impl Overwrite {
 
     /// Writes the file. One that has come since is not replaced either.
     pub fn write(self, out: &Path, bytes: &[u8]) -> Result<(), Failure> {
-        let mut opening = OpenOptions::new();
-        let opening = opening.write(true).truncate(true).create(true).create_new(!self.overwrite);
-        let written = opening.open(out).and_then(|mut file| file.write_all(bytes));
+        let written = self.open(out).and_then(|mut file| file.write_all(bytes));
         written.map_err(|error| Failure::new(format!("{} cannot be written: {error}", out.display())))
+    }
+
+    fn open(self, out: &Path) -> io::Result<File> {
+        let mut opening = OpenOptions::new();
+        match Target::of(out) {
+            // What a redirected output has already stays.
+            Target::Stream => opening.append(true),
+            Target::Nothing | Target::File => {
+                opening.write(true).truncate(true).create(true).create_new(!self.overwrite)
+            }
+        };
+        opening.open(out)
+    }
+}
+
+/// What is at the path of a file to write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Target {
+    Nothing,
+    /// A regular file, or a link to a file that is not there.
+    File,
+    /// A device, a pipe, or an output of this process as in `/dev/stdout`.
+    Stream,
+}
+
+impl Target {
+    fn of(path: &Path) -> Target {
+        let is_output = ["/dev/stdout", "/dev/stderr"].map(Path::new).contains(&path);
+        match fs::metadata(path) {
+            Ok(_) if is_output || ["/dev/fd", "/proc/self/fd"].iter().any(|of| path.starts_with(of)) => Target::Stream,
+            Ok(there) if there.is_file() || there.is_dir() => Target::File,
+            Ok(_) => Target::Stream,
+            Err(_) if fs::symlink_metadata(path).is_ok() => Target::File,
+            Err(_) => Target::Nothing,
+        }
     }
 }

@@ -16,6 +16,7 @@ use ringcat_control::Client;
 use ringcat_control::client::ClientError;
 use ringcat_control::message::{Activity, Answer, Query};
 use ringcat_control::tool::{MasterReport, Piece, ToolAnswer, ToolQuery};
+use ringcat_link::job::leave_to_others;
 
 use crate::arguments::Arguments;
 use crate::failure::{Failure, unexpected};
@@ -173,6 +174,8 @@ impl Drop for Standalone {
 fn listen_to(stderr: Option<ChildStderr>) -> Option<JoinHandle<String>> {
     let mut stderr = stderr?;
     let read = move || {
+        // `watch` gives the terminal back before a signal takes effect.
+        leave_to_others();
         let (mut kept, mut part) = (Vec::new(), [0; 1024]);
         while let Ok(count @ 1..) = stderr.read(&mut part) {
             let room = MOST_WORDS - kept.len();

@@ -3,6 +3,8 @@
 
 use std::mem::zeroed;
 
+use crate::signals::HeldSignals;
+
 /// A signal of the terminal or of a shell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JobSignal {
@@ -33,7 +35,8 @@ impl JobSignal {
 pub struct HeldJobSignals(());
 
 impl HeldJobSignals {
-    /// Blocks the signals in the calling thread, which has to be the only one that does not block them.
+    /// Blocks the signals in the calling thread, which has to be the only one that does not block them: see
+    /// [`leave_to_others`].
     pub fn hold() -> HeldJobSignals {
         change(libc::SIG_BLOCK, &JobSignal::ALL);
         HeldJobSignals(())
@@ -52,11 +55,28 @@ impl HeldJobSignals {
     /// Stops this process, until SIGCONT. It goes on at once where no shell could continue it: in an orphaned
     /// process group.
     pub fn stop(&self) {
-        // SAFETY: no pointers are passed. The signal is of this process.
-        unsafe { libc::kill(libc::getpid(), libc::SIGTSTP) };
+        // SAFETY: no pointers are passed. The identifier is that of this process.
+        self.stop_by(unsafe { libc::getpid() });
+    }
+
+    /// As [`HeldJobSignals::stop`], with all other processes of its group: as the terminal does for Ctrl-Z.
+    pub fn stop_group(&self) {
+        self.stop_by(0);
+    }
+
+    fn stop_by(&self, target: libc::pid_t) {
+        // SAFETY: no pointers are passed. The target is this process, or its group.
+        unsafe { libc::kill(target, libc::SIGTSTP) };
         change(libc::SIG_UNBLOCK, &[JobSignal::Stop]);
         change(libc::SIG_BLOCK, &[JobSignal::Stop]);
     }
+}
+
+/// Blocks these signals and those that request an end in the calling thread: another thread of the program receives
+/// them.
+pub fn leave_to_others() {
+    HeldSignals::hold();
+    change(libc::SIG_BLOCK, &JobSignal::ALL);
 }
 
 impl Drop for HeldJobSignals {

@@ -10,6 +10,7 @@ mod documented;
 mod exit_codes;
 mod files;
 mod json;
+mod out_files;
 mod pages;
 mod paired;
 #[cfg(feature = "standby")]

@@ -77,23 +77,27 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
 /// What ends or interrupts the table: keys and signals.
 struct End {
     signals: HeldSignals,
-    jobs: HeldJobSignals,
+    /// Dropped first: a signal that has come takes effect when the terminal is given back.
     keys: Keys,
+    jobs: HeldJobSignals,
     /// Number of times that the program was stopped: the screen was that of others meanwhile.
     stops: u32,
 }
 
 impl End {
     fn start() -> io::Result<End> {
-        Ok(End { signals: HeldSignals::hold(), jobs: HeldJobSignals::hold(), keys: Keys::start()?, stops: 0 })
+        let (signals, jobs) = (HeldSignals::hold(), HeldJobSignals::hold());
+        Ok(End { signals, keys: Keys::start()?, jobs, stops: 0 })
     }
 
     /// Waits so long for a key that ends the table, and looks for signals.
     fn check(&mut self, limit: Duration) -> ControlFlow<()> {
         let pressed = self.keys.next(limit);
         let signal = self.jobs.next();
-        if pressed == Some(Key::Byte(CTRL_Z)) || signal == Some(JobSignal::Stop) {
-            self.stop();
+        if pressed == Some(Key::Byte(CTRL_Z)) {
+            self.stop(HeldJobSignals::stop_group);
+        } else if signal == Some(JobSignal::Stop) {
+            self.stop(HeldJobSignals::stop);
         } else if signal == Some(JobSignal::Continue) {
             self.go_on();
         }
@@ -111,10 +115,10 @@ impl End {
 
 impl End {
     /// Gives the terminal back, and stops until the shell continues this program.
-    fn stop(&mut self) {
+    fn stop(&mut self, stop: fn(&HeldJobSignals)) {
         screen::put(screen::END);
         self.keys.pause();
-        self.jobs.stop();
+        stop(&self.jobs);
         self.go_on();
     }
 

@@ -11,7 +11,7 @@ use crate::bench::{Done, LONG, PROGRAM, directory, tool};
 const NOWHERE: &str = "/nothing/listens/here";
 
 /// Whether the program of the daemon is beside the tool: `cargo test --workspace` makes it.
-fn has_daemon() -> bool {
+pub fn has_daemon() -> bool {
     let is_there = Path::new(PROGRAM).with_file_name("ringcatd").is_file();
     assert!(is_there || std::env::var_os("CI").is_none(), "the whole workspace is built");
     if !is_there {

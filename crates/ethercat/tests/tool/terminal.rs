@@ -16,6 +16,7 @@ use ringcat_link::terminal::Keys;
 use crate::bench::{Bench, Driver, LONG, PROGRAM, directory};
 use crate::golden_bus::{WITH_SOE, segment};
 use crate::several::ring;
+use crate::standalone::has_daemon;
 
 const CYCLE: Duration = Duration::from_millis(1);
 /// Removes a bar: the beginning of the line, and nothing behind it.
@@ -244,42 +245,77 @@ fn is_usual(settings: &str) -> bool {
     ["icanon", "echo", "isig"].iter().all(|wanted| settings.split_whitespace().any(|word| word == *wanted))
 }
 
+/// The table leaves the alternate screen.
+const LEFT: &str = "\u{1b}[?25h\u{1b}[?1049l";
+/// The table begins there.
+const DRAWN: &str = "\u{1b}[?1049h\u{1b}[?25l\u{1b}[HMaster0  idle";
+
+/// What is in a file of the shell.
+fn file(bench: &Bench, name: &str) -> String {
+    std::fs::read_to_string(bench.directory.join(name)).unwrap_or_default()
+}
+
+/// Sends a signal to the process whose number the shell has written.
+fn kill(bench: &Bench, signal: &str) {
+    let sent = Command::new("kill").args([signal, file(bench, "pid").trim()]).status();
+    assert!(sent.expect("it is there").success());
+}
+
+/// `stty` on the terminal of the shell, from outside.
+fn stty(bench: &Bench, arguments: &[&str]) -> String {
+    let done = Command::new("stty").args(["-F", file(bench, "tty").trim()]).args(arguments).output();
+    String::from_utf8_lossy(&done.expect("coreutils are there").stdout).into_owned()
+}
+
 // covers: daemon
 #[test]
 fn a_live_table_that_is_stopped_gives_the_terminal_back_and_is_drawn_again() {
-    const END: &str = "\u{1b}[?25h\u{1b}[?1049l";
-    const AGAIN: &str = "\u{1b}[?1049h\u{1b}[?25l\u{1b}[HMaster0  idle";
     let bench = Bench::start(vec![ring(2, false)]);
-    let file = |name: &str| std::fs::read_to_string(bench.directory.join(name)).unwrap_or_default();
-    let shell = "set -m; sh -c 'echo $$ > pid; exec $E watch'; stty -a > stopped; echo $? > code; fg > /dev/null";
-    let last = "stty sane; echo > sane; fg > /dev/null; stty -a > after";
-    // By a signal, and by the key.
-    let mut terminal = Terminal::start(&bench, &format!("{shell}; stty -a > again; fg > /dev/null; {last}"));
-    let at = terminal.wait_for_all(&[AGAIN], 0);
-    let kill = |signal: &str| {
-        let sent = Command::new("kill").args([signal, file("pid").trim()]).status();
-        assert!(sent.expect("it is there").success());
-    };
-    kill("-TSTP");
-    let at = terminal.wait_for_all(&[END, AGAIN], at);
-    assert!(is_usual(&file("stopped")), "{}", file("stopped"));
-    terminal.press(b"\x1a");
-    let at = terminal.wait_for_all(&[END, AGAIN], at);
-    assert!(is_usual(&file("again")), "{}", file("again"));
-    // SIGSTOP cannot be received: the table takes the terminal again when it goes on.
-    let tty = file("tty");
-    let stty = |arguments: &[&str]| {
-        let done = Command::new("stty").args(["-F", tty.trim()]).args(arguments).output().expect("coreutils are there");
-        String::from_utf8_lossy(&done.stdout).into_owned()
-    };
-    kill("-STOP");
-    bench.wait_until("the shell", || bench.directory.join("sane").exists());
-    bench.wait_until("the terminal is taken again", || stty(&["-a"]).contains("-icanon"));
-    terminal.wait_for_all(&[AGAIN], at);
-    kill("-QUIT");
+    let sim = bench.directory.join("sim.toml");
+    std::fs::write(&sim, "[[device]]\ntype = \"digital-input-8\"\n").expect("it can be written");
+    // With the daemon that runs, and with one of its own.
+    let commands = ["$E watch".to_owned(), format!("$E watch --sim {}", sim.display())];
+    for command in &commands[..if has_daemon() { 2 } else { 1 }] {
+        for name in ["pid", "stopped", "again", "after"] {
+            let _ = std::fs::remove_file(bench.directory.join(name));
+        }
+        let shell = format!("set -m; sh -c 'echo $$ > pid; exec {command}'; stty -a > stopped; fg > /dev/null");
+        // By a signal, and by the key.
+        let last = "stty -a > again; fg > /dev/null; stty -a > after";
+        let mut terminal = Terminal::start(&bench, &format!("{shell}; {last}"));
+        let at = terminal.wait_for_all(&[DRAWN], 0);
+        kill(&bench, "-TSTP");
+        let at = terminal.wait_for_all(&[LEFT, DRAWN], at);
+        assert!(is_usual(&file(&bench, "stopped")), "{command}: {}", file(&bench, "stopped"));
+        terminal.press(b"\x1a");
+        terminal.wait_for_all(&[LEFT, DRAWN], at);
+        assert!(is_usual(&file(&bench, "again")), "{command}: {}", file(&bench, "again"));
+        kill(&bench, "-QUIT");
+        let (shown, _) = terminal.end();
+        assert!(shown.ends_with(LEFT), "{command}: {shown:?}");
+        assert!(is_usual(&file(&bench, "after")), "{command}: {}", file(&bench, "after"));
+    }
+}
+
+// covers: daemon
+#[test]
+fn a_live_table_takes_the_terminal_again_after_sigstop() {
+    // It cannot be received. Without job control: the shell would see that the table is stopped.
+    let bench = Bench::start(vec![ring(2, false)]);
+    let terminal = Terminal::start(&bench, "sh -c 'echo $$ > pid; exec $E watch'; stty -a > after");
+    let at = terminal.wait_for_all(&[DRAWN], 0);
+    kill(&bench, "-STOP");
+    let stat = format!("/proc/{}/stat", file(&bench, "pid").trim());
+    bench.wait_until("it stops", || std::fs::read_to_string(&stat).is_ok_and(|stat| stat.contains(") T ")));
+    stty(&bench, &["sane"]);
+    assert!(is_usual(&stty(&bench, &["-a"])));
+    kill(&bench, "-CONT");
+    bench.wait_until("the terminal is taken again", || stty(&bench, &["-a"]).contains("-icanon"));
+    terminal.wait_for_all(&[DRAWN], at);
+    kill(&bench, "-TERM");
     let (shown, _) = terminal.end();
-    assert!(shown.ends_with("\u{1b}[?25h\u{1b}[?1049l"), "{shown:?}");
-    assert!(is_usual(&file("after")), "{}", file("after"));
+    assert!(shown.ends_with(LEFT), "{shown:?}");
+    assert!(is_usual(&file(&bench, "after")), "{}", file(&bench, "after"));
 }
 
 // covers: daemon

@@ -361,11 +361,29 @@ fn a_removal_disables_its_own_units_and_leaves_those_of_a_package_enabled() {
         all.flatten().map(|it| it.file_name().into_string().expect("text")).collect::<BTreeSet<String>>()
     };
     let all = BTreeSet::from(["ethercat.service", "other.service", "ringcat-standby@left.service"].map(String::from));
-    for (of, left) in [("/usr", all), ("/usr/local", BTreeSet::from(["other.service".to_owned()]))] {
+    let other = BTreeSet::from(["other.service".to_owned()]);
+    for (of, left) in [("/usr", &all), ("/usr/local", &other)] {
         root.install(&["--prefix", "/usr/local"]);
         links(of);
         said(&root.run(&["--prefix", "/usr/local", "--uninstall"]), true);
-        assert_eq!(enabled(), left, "units of {of}");
+        assert_eq!(enabled(), *left, "units of {of}");
+    }
+    // systemd names /lib, which is a link to /usr/lib.
+    root.install(&["--prefix", "/usr"]);
+    std::os::unix::fs::symlink("usr/lib", root.path("/lib")).expect("it can be made");
+    links("");
+    said(&root.run(&["--prefix", "/usr", "--uninstall"]), true);
+    assert_eq!(enabled(), other, "units by /lib");
+    // Edited units, with the programs of this installation and with those of a package.
+    for (prefix, left) in [("/usr/local", &other), ("/usr", &all)] {
+        root.install(&["--prefix", "/usr/local"]);
+        links("/etc");
+        for (unit, program) in [("ethercat", "sbin/ringcatd --conf"), ("ringcat-standby@", "bin/ringcat run")] {
+            let path = format!("/etc/lib/systemd/system/{unit}.service");
+            root.write(&path, &format!("ExecStart={prefix}/{program} a\n"));
+        }
+        said(&root.run(&["--prefix", "/usr/local", "--uninstall"]), true);
+        assert_eq!(enabled(), *left, "edited units of {prefix}");
     }
 }
 

@@ -156,7 +156,7 @@ fn another_version(directory: &Path) -> Child {
     std::os::unix::fs::symlink(own, &program).expect("it is free");
     let mut daemon = Command::new(program);
     daemon.args(["--exact", "service::ethercatctl_queries_and_stops_a_daemon_of_another_version", "--nocapture"]);
-    daemon.env(OF_ANOTHER_VERSION, directory.join("socket")).stdout(Stdio::null());
+    daemon.env(OF_ANOTHER_VERSION, directory.join("socket")).stdout(Stdio::null()).stderr(Stdio::null());
     let daemon = daemon.spawn().expect("it is a program");
     let begin = Instant::now();
     while !directory.join("socket").exists() {
@@ -166,8 +166,12 @@ fn another_version(directory: &Path) -> Child {
     daemon
 }
 
-/// What that process does, until it is ended.
+/// What that process does, until it is ended. A test that fails does not end it.
 fn be_of_another_version(socket: &Path) -> ! {
+    std::thread::spawn(|| {
+        std::thread::sleep(LONG * 3);
+        std::process::exit(1);
+    });
     let listener = UnixListener::bind(socket).expect("it is free");
     let mut message = encode(&Content::Hello { program: "another".to_owned() }.into()).expect("it is short");
     message[4..6].copy_from_slice(&(VERSION - 1).to_le_bytes());
