@@ -18,8 +18,9 @@ pub use ringcat_link::operator::{OperatorLines, Priority};
 
 pub use self::lines::Lines;
 use self::lines::{Counts, Sample};
-use super::frame_record::{FrameRecord, RecordReason};
+use super::frame_record::FrameRecord;
 use super::ownership::OwnershipWatch;
+use super::record_files::RecordReason;
 use super::serving;
 use crate::services::Services;
 use crate::supervisor_thread::SupervisorThread;

@@ -18,8 +18,7 @@ use ringcat_link::operator::Priority;
 use ringcat_link::recorder::{FrameReader, FrameRing};
 use ringcat_link::{AlreadyRead, Taps};
 
-use super::record_files::RecordFiles;
-pub use super::record_files::RecordReason;
+use super::record_files::{RecordFiles, RecordReason};
 
 /// Frames of this time behind a fault are in its file.
 const AFTER: Duration = Duration::from_millis(200);
@@ -73,7 +72,14 @@ impl fmt::Display for RecordError {
     }
 }
 
-impl std::error::Error for RecordError {}
+impl std::error::Error for RecordError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            RecordError::AlreadyRead(error) => Some(error),
+            RecordError::Memory(_) => None,
+        }
+    }
+}
 
 /// A recording of the last seconds that goes on until it is dropped.
 #[derive(Debug)]
