@@ -5,6 +5,8 @@
 //! A client sends [`RemoteQuery::Hello`] with the token, then one query after the other; each has one answer. Any bytes
 //! are allowed: decoding never panics, and takes no more memory than a small multiple of the limit.
 
+use std::fmt;
+
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -20,8 +22,8 @@ pub const LONGEST_ANSWER: usize = 1 << 20;
 const HEADER: usize = 12;
 const MAGIC: [u8; 4] = *b"RCRA";
 
-/// What a client says.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// What a client says. Its `Debug` leaves the token out.
+#[derive(Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum RemoteQuery {
     /// First message: what shows that the client may ask.
@@ -46,6 +48,21 @@ pub enum RemoteQuery {
         /// The role also while a write into the memory of a SubDevice is under way.
         force: bool,
     },
+}
+
+impl fmt::Debug for RemoteQuery {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            RemoteQuery::Hello { .. } => f.write_str("Hello(..)"),
+            RemoteQuery::State => f.write_str("State"),
+            RemoteQuery::Request { role, force } => {
+                f.debug_struct("Request").field("role", role).field("force", force).finish()
+            }
+            RemoteQuery::Hold { held, force } => {
+                f.debug_struct("Hold").field("held", held).field("force", force).finish()
+            }
+        }
+    }
 }
 
 /// A role that is requested.
@@ -189,6 +206,15 @@ mod tests {
         }
         assert_eq!(decode(&bytes, LONGEST_QUERY), Ok(Some((first, end))));
         assert_eq!(decode(&bytes[end..], LONGEST_QUERY), Ok(Some((second, bytes.len() - end))));
+    }
+
+    // covers: AC-08, standby
+    #[test]
+    fn a_query_is_printed_without_its_token() {
+        let hello = format!("{:?}", RemoteQuery::Hello { token: "0123456789abcdef".to_owned() });
+        assert!(!hello.contains("0123"), "{hello}");
+        let hold = format!("{:?}", RemoteQuery::Hold { held: true, force: false });
+        assert_eq!(hold, "Hold { held: true, force: false }");
     }
 
     // covers: AC-08, standby

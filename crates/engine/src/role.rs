@@ -11,6 +11,8 @@ mod partner;
 
 use core::fmt;
 
+#[cfg(feature = "standby")]
+pub(crate) use control::Taken;
 pub use control::{RoleCause, RoleControl, RoleRequest};
 #[cfg(feature = "standby")]
 pub use partner::Partner;

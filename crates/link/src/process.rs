@@ -2,9 +2,12 @@
 //!
 //! The rights of a peer are those at the time of its connection. Not for the cyclic path.
 
+use std::fs::{File, OpenOptions};
 use std::io;
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd, FromRawFd, OwnedFd};
+use std::os::unix::fs::OpenOptionsExt;
 use std::os::unix::net::UnixStream;
+use std::path::Path;
 use std::time::Duration;
 
 use crate::kernel;
@@ -50,6 +53,14 @@ impl Peer {
         groups.insert(0, own.gid);
         Ok(Peer { pid: u32::try_from(own.pid).unwrap_or(0), uid: own.uid, groups })
     }
+}
+
+/// Opens a file to read it, and does not wait: not for the writer of a pipe either.
+///
+/// # Errors
+/// It cannot be opened.
+pub fn open_at_once(path: &Path) -> io::Result<File> {
+    OpenOptions::new().read(true).custom_flags(libc::O_NONBLOCK).open(path)
 }
 
 /// The effective user of this process.

@@ -20,7 +20,7 @@ fn controller(mut links: HostLinks, listen: Duration) -> Result<(), Error> {
     let host = links.host();
     // Links are up only while the program forwards or is ACTIVE.
     links.switch(true);
-    let options = Options::default().with_standby(StandbyOptions::default());
+    let options = Options::default().with_standby(StandbyOptions::default().with_needs_guard(false));
     let policy = Policy::default().with_time_out(3, Duration::ZERO).with_listen(listen);
     let main_device = MainDevice::request(links, &options);
     let mut application = main_device.join(&policy, |scan| automatic(&scan.subdevices, CYCLE))?;

@@ -3,9 +3,9 @@
 use std::sync::{Arc, OnceLock};
 
 use ringcat::event_log::EventLog;
-use ringcat::standby::StandbyEvent;
+use ringcat::standby::{RoleCause, StandbyEvent};
 use ringcat::text::{Names, describe};
-use ringcat::{Event, Instant, SupervisorThread};
+use ringcat::{Event, Instant, MainDeviceRole, SupervisorThread};
 
 use crate::json::standby::Takeover;
 use crate::output::{say, write_event};
@@ -21,6 +21,8 @@ pub struct EventReport {
     pub seen: Takeover,
     /// Why the role was not handed over.
     pub refused: Option<String>,
+    /// Why this MainDevice has become INACTIVE last.
+    pub cause: Option<RoleCause>,
     /// How the configuration of the other MainDevice differs.
     pub difference: Option<String>,
     /// SubDevices whose watchdog is too short for a takeover, in words.
@@ -32,7 +34,7 @@ impl EventReport {
     pub fn new(begin: Instant) -> EventReport {
         let (log, seen) = (EventLog::new(begin, Names::default()), Takeover::default());
         let (names, short_watchdogs) = (Arc::default(), Vec::new());
-        EventReport { begin, log, names, seen, refused: None, difference: None, short_watchdogs }
+        EventReport { begin, log, names, seen, refused: None, cause: None, difference: None, short_watchdogs }
     }
 
     /// Prints the events since the last call.
@@ -76,7 +78,12 @@ impl EventReport {
     fn count(&mut self, event: &StandbyEvent) {
         let seen = &mut self.seen;
         match event {
-            StandbyEvent::RoleChanged { .. } => seen.role_changes += 1,
+            StandbyEvent::RoleChanged { role, cause } => {
+                seen.role_changes += 1;
+                if *role == MainDeviceRole::Inactive {
+                    self.cause = Some(*cause);
+                }
+            }
             StandbyEvent::TookOver { is_hot, .. } => {
                 seen.takeovers += 1;
                 seen.warm_takeovers += u64::from(!is_hot);

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use clap::Args;
 use ringcat::Instant;
+use ringcat::standby::RoleControl;
 use ringcat::standby::guard::{self, Ending, Guard, Pulse};
 use ringcat_link::{HeldSignals, realtime};
 
@@ -94,6 +95,13 @@ impl Guarded {
         }
         let guard = Guard::start(command, &interfaces, limit).map_err(|error| Failure::new(error.to_string()))?;
         Ok(Guarded { guard: Some(guard), limit, look_at: Instant::default(), fault: None })
+    }
+
+    /// The guard, if there is one, protects this MainDevice.
+    pub fn protect(&mut self, control: &RoleControl) {
+        if let Some(guard) = &mut self.guard {
+            guard.protect(control);
+        }
     }
 
     /// Whether this process is not guarded as it should be.

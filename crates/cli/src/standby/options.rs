@@ -8,6 +8,7 @@ use ringcat::standby::{MasterSizes, Policy};
 use super::ethernet::EthernetArguments;
 use super::guarding;
 use super::remote::ServerArguments;
+use super::schedule;
 use crate::interfaces::LinkNames;
 use crate::numbers::number;
 use crate::run::declared::DeclarationArguments;
@@ -120,8 +121,8 @@ pub struct PolicyArguments {
     /// Hand the role over each time this one has been ACTIVE for this time
     ///
     /// As proof that the other one can take over; with this option there as well, it hands the role back. A switchover
-    /// is refused and reported when not ready, and the exit status is then 1.
-    #[arg(long, value_name = "TIME", value_parser = time, requires = "declaration")]
+    /// is refused and reported when not ready, and the exit status is then 1. At least 1 s.
+    #[arg(long, value_name = "TIME", value_parser = schedule::every, requires = "declaration")]
     #[arg(conflicts_with = "permanent_standby")]
     pub switch_every: Option<Duration>,
     /// End if the watchdog of a SubDevice is too short for a takeover

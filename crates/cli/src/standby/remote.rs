@@ -1,6 +1,7 @@
 //! Remote access to `ringcat standby` (`--remote`), and the client `ringcat remote`.
 
 use std::net::{SocketAddr, TcpListener};
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -14,13 +15,22 @@ use crate::failure::Failure;
 use crate::json::data::Data;
 use crate::json::remote::Remote;
 use crate::output::say;
-use crate::times::time;
+use crate::times::{in_words, time};
 use crate::verdict::{Report, Verdict};
 
 /// A requested role has this long to take effect.
 const EFFECT: Duration = Duration::from_secs(2);
 /// Interval at which that is checked.
 const LOOK: Duration = Duration::from_millis(20);
+
+/// Periods at which clients may be answered.
+const CYCLES: RangeInclusive<Duration> = Duration::from_millis(1)..=Duration::from_secs(1);
+
+fn cycle(text: &str) -> Result<Duration, String> {
+    let cycle = time(text)?;
+    let (least, most) = (in_words(*CYCLES.start()), in_words(*CYCLES.end()));
+    if CYCLES.contains(&cycle) { Ok(cycle) } else { Err(format!("expected {least} to {most}")) }
+}
 
 /// Options of the server.
 #[derive(Args, Clone, Debug)]
@@ -35,8 +45,8 @@ pub struct ServerArguments {
     /// File with the token that clients need, readable by its owner only
     #[arg(long, value_name = "FILE", requires = "remote")]
     remote_token: Option<PathBuf>,
-    /// Period at which clients are answered
-    #[arg(long, value_name = "TIME", value_parser = time, default_value = "10ms", requires = "remote")]
+    /// Period at which clients are answered, 1 ms to 1 s
+    #[arg(long, value_name = "TIME", value_parser = cycle, default_value = "10ms", requires = "remote")]
     remote_cycle: Duration,
 }
 

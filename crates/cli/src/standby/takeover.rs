@@ -23,7 +23,7 @@ use super::event_report::EventReport;
 use super::guarding::Guarded;
 use super::joining::{Joined, Joiner};
 use super::options::StandbyArguments;
-use super::schedule::{HAND_OVER_LIMIT, Schedule, Step};
+use super::schedule::{HAND_OVER_LIMIT, NOT_TAKEN, Schedule, Step};
 use crate::ending::EndRequest;
 use crate::failure::Failure;
 use crate::interfaces::now;
@@ -79,7 +79,7 @@ pub fn run(arguments: &StandbyArguments) -> Result<Report, Failure> {
     let thread = arguments.thread;
     let (cyclic, acyclic) = PacketLinks::open_forwarding_halves(&names.main, redundant, thread.mode())?;
     check_sockets(names.all(), arguments.force)?;
-    let guarded = if arguments.no_guard {
+    let mut guarded = if arguments.no_guard {
         Guarded::unguarded()
     } else {
         Guarded::start(arguments.guard, thread.priority, [&names.main, redundant])?
@@ -95,7 +95,7 @@ pub fn run(arguments: &StandbyArguments) -> Result<Report, Failure> {
     let supervisor = SupervisorThread::start(acyclic, &options, move || thread.prepare_supervisor())?;
     let ethernet = arguments.ethernet.start(&supervisor, main)?;
     let control = supervisor.role_control()?;
-    control.set_not_ready(NotReady::GUARD.0, arguments.no_guard);
+    guarded.protect(&control);
     let remote = arguments.remote.start(&supervisor)?;
     let schedule = arguments.policy.switch_every.map(Schedule::new);
     // Nothing else sets it.
@@ -177,8 +177,10 @@ impl Controller<'_> {
         }
         let Some(schedule) = &mut self.schedule else { return };
         let (role, readiness) = (self.control.role(), self.control.readiness());
-        let words = match schedule.step(now(), role, readiness, &mut self.events.refused) {
+        let answers = (&mut self.events.refused, self.events.cause);
+        let words = match schedule.step(now(), role, readiness, answers) {
             Some(Step::Request) => {
+                self.events.cause = None;
                 self.control.request(RoleRequest::HandOver);
                 "switchover on schedule: the role is offered".to_owned()
             }
@@ -186,6 +188,11 @@ impl Controller<'_> {
                 format!("switchover on schedule: handed over within {:.3} ms", time.as_secs_f64() * 1e3)
             }
             Some(Step::Refused(why)) => format!("switchover on schedule REFUSED: {why}"),
+            Some(Step::Withdraw) => {
+                // The offer ends, and so does a request that has not taken effect.
+                self.control.request(RoleRequest::Active);
+                format!("switchover on schedule REFUSED: {NOT_TAKEN}, the offer is withdrawn")
+            }
             None => return,
         };
         self.events.say(now(), &words);
@@ -254,7 +261,7 @@ impl Controller<'_> {
             return None;
         }
         let refused = self.events.refused.take();
-        Some(refused.unwrap_or_else(|| "the other MainDevice did not take the role".to_owned()))
+        Some(refused.unwrap_or_else(|| NOT_TAKEN.to_owned()))
     }
 
     /// Ends the cycles in order.

@@ -12,6 +12,7 @@ pub(super) mod take_over;
 use alloc::sync::Arc;
 
 use ringcat_wire::frame::MacAddress;
+use ringcat_wire::master_frame::NotReady;
 use ringcat_wire::memory_write::MemoryWrite;
 
 use crate::board::standby::StandbyWords;
@@ -83,6 +84,7 @@ impl Standby {
         (links, control): (LinkSet, &RoleControl),
         now: Instant,
     ) -> Standby {
+        control.set_not_ready(NotReady::GUARD.0, options.needs_guard);
         let words: Arc<StandbyWords> = Arc::default();
         let has_ethernet = options.max_acyclic > 0 && links == LinkSet::Ring;
         let ethernet = has_ethernet.then(|| PartnerEthernet::new(*identity, options.max_acyclic, now));

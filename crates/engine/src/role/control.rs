@@ -70,6 +70,27 @@ impl fmt::Display for RoleCause {
 
 /// Bit of a request: it takes effect also while a write into the memory of a SubDevice is under way.
 const FORCED: u8 = 0x80;
+/// Bit of a request: permanent standby begins when it takes effect.
+#[cfg(any(test, feature = "standby"))]
+const HOLDS: u8 = 0x40;
+/// Bits that are no role.
+const MODIFIERS: u8 = 0xC0;
+/// Bit of the reasons of the application, of no reason: [`RoleControl::hold`] was called.
+#[cfg(feature = "standby")]
+const HOLD_DECIDED: u16 = 0x8000;
+/// The bits that are reasons.
+const REASONS: u16 = 0x7FFF;
+
+/// A request when it is taken.
+#[cfg(any(test, feature = "standby"))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Taken {
+    pub request: RoleRequest,
+    /// Also while a write into the memory of a SubDevice is under way.
+    pub is_forced: bool,
+    /// Permanent standby begins if it is not refused.
+    pub holds: bool,
+}
 
 #[derive(Debug)]
 struct Words {
@@ -142,7 +163,7 @@ impl RoleControl {
 
     /// The request that has not taken effect yet.
     pub fn requested(&self) -> Option<RoleRequest> {
-        RoleRequest::from_code(self.words.request.load(Ordering::Acquire) & !FORCED)
+        RoleRequest::from_code(self.words.request.load(Ordering::Acquire) & !MODIFIERS)
     }
 
     /// Whether there is a request. Cheap.
@@ -152,11 +173,12 @@ impl RoleControl {
         self.words.request.load(Ordering::Relaxed) != 0
     }
 
-    /// Takes the request, and whether it is forced: the cycle in which it takes effect begins.
+    /// Takes the request: the cycle in which it takes effect begins.
     #[cfg(any(test, feature = "standby"))]
-    pub(crate) fn take_request(&self) -> Option<(RoleRequest, bool)> {
+    pub(crate) fn take_request(&self) -> Option<Taken> {
         let code = self.words.request.swap(0, Ordering::AcqRel);
-        Some((RoleRequest::from_code(code & !FORCED)?, code & FORCED != 0))
+        let request = RoleRequest::from_code(code & !MODIFIERS)?;
+        Some(Taken { request, is_forced: code & FORCED != 0, holds: code & HOLDS != 0 })
     }
 
     /// Sets the role; false if it is that already. For the half that runs the cycles.
@@ -171,6 +193,7 @@ impl RoleControl {
     /// Sets reasons against a takeover, as bits of `NotReady`: the application is not ready, or this MainDevice is to
     /// stay INACTIVE.
     pub fn set_not_ready(&self, bits: u16, set: bool) {
+        let bits = bits & REASONS;
         match set {
             true => self.words.not_ready.fetch_or(bits, Ordering::Relaxed),
             false => self.words.not_ready.fetch_and(!bits, Ordering::Relaxed),
@@ -179,7 +202,7 @@ impl RoleControl {
 
     /// The reasons that are set.
     pub fn not_ready(&self) -> u16 {
-        self.words.not_ready.load(Ordering::Relaxed)
+        self.words.not_ready.load(Ordering::Relaxed) & REASONS
     }
 
     /// Whether this MainDevice is to stay INACTIVE (permanent standby): a policy then neither takes over nor accepts
@@ -190,10 +213,31 @@ impl RoleControl {
     }
 
     /// Switches the permanent standby on or off, from the next cycle on (the notifications 1 and 2 of protocol 9.10,
-    /// which also request [`RoleRequest::Inactive`] with the first one).
+    /// which also request [`RoleRequest::Inactive`] with the first one: [`RoleControl::request_hold`]).
     #[cfg(feature = "standby")]
     pub fn hold(&self, held: bool) {
-        self.set_not_ready(NotReady::HELD.0, held);
+        self.change_hold(|before| Some(with_hold(before, held) | HOLD_DECIDED));
+    }
+
+    /// Requests [`RoleRequest::Inactive`] and permanent standby together from the next cycle on: if the request is
+    /// refused because of a write, neither takes effect. `force`: it is not refused.
+    #[cfg(feature = "standby")]
+    pub fn request_hold(&self, force: bool) {
+        let forced = if force { FORCED } else { 0 };
+        self.words.request.store(RoleRequest::Inactive.code() | HOLDS | forced, Ordering::Release);
+    }
+
+    /// Permanent standby as a policy says, before an application begins; no change if it was decided with
+    /// [`RoleControl::hold`] or [`RoleControl::request_hold`] before.
+    #[cfg(feature = "standby")]
+    pub fn begin_held(&self, held: bool) {
+        self.change_hold(|before| (before & HOLD_DECIDED == 0).then(|| with_hold(before, held)));
+    }
+
+    #[cfg(feature = "standby")]
+    fn change_hold(&self, change: impl Fn(u16) -> Option<u16>) {
+        // It is not changed where `change` returns nothing.
+        let _ = self.words.not_ready.fetch_update(Ordering::Relaxed, Ordering::Relaxed, change);
     }
 
     /// Why a failure of one MainDevice now would cost more than the time-out of a takeover, as this one has seen it in
@@ -211,6 +255,11 @@ impl RoleControl {
     }
 }
 
+#[cfg(feature = "standby")]
+const fn with_hold(bits: u16, held: bool) -> u16 {
+    NotReady(bits).with(NotReady::HELD, held).0
+}
+
 const fn code(role: MainDeviceRole) -> u8 {
     match role {
         MainDeviceRole::Active => 0,
@@ -225,6 +274,7 @@ mod tests {
     // covers: MR-01, MR-02, MR-03, standby
     #[test]
     fn the_last_request_counts_and_the_present_role_is_no_change() {
+        let taken = |request, is_forced| Taken { request, is_forced, holds: false };
         let control = RoleControl::new(MainDeviceRole::Inactive);
         let handle = control.clone();
         assert_eq!((control.role(), control.requested()), (MainDeviceRole::Inactive, None));
@@ -232,10 +282,10 @@ mod tests {
         handle.request(RoleRequest::HandOver);
         handle.request(RoleRequest::Inactive);
         assert_eq!(control.role(), MainDeviceRole::Inactive, "before the next cycle");
-        assert_eq!(control.take_request(), Some((RoleRequest::Inactive, false)));
+        assert_eq!(control.take_request(), Some(taken(RoleRequest::Inactive, false)));
         handle.force(RoleRequest::HandOver);
         assert_eq!(control.requested(), Some(RoleRequest::HandOver));
-        assert_eq!(control.take_request(), Some((RoleRequest::HandOver, true)));
+        assert_eq!(control.take_request(), Some(taken(RoleRequest::HandOver, true)));
         assert_eq!((control.take_request(), control.requested()), (None, None));
         assert!(!control.set(MainDeviceRole::Inactive) && control.changes() == 0);
         assert!(control.set(MainDeviceRole::Active) && handle.changes() == 1);
@@ -243,5 +293,26 @@ mod tests {
         handle.set_not_ready(0x50, true);
         handle.set_not_ready(0x10, false);
         assert_eq!(control.not_ready(), 0x40);
+    }
+
+    // covers: MR-15, standby
+    #[test]
+    #[cfg(feature = "standby")]
+    fn a_hold_that_was_decided_stays_and_a_requested_one_waits() {
+        let control = RoleControl::new(MainDeviceRole::Active);
+        control.begin_held(true);
+        assert!(control.is_held());
+        control.begin_held(false);
+        assert!(!control.is_held(), "the policy of a later application");
+        control.hold(true);
+        control.begin_held(false);
+        assert!(control.is_held(), "it was decided");
+        control.hold(false);
+        control.begin_held(true);
+        assert!(!control.is_held() && control.not_ready() == 0);
+        control.request_hold(true);
+        assert!(!control.is_held() && control.requested() == Some(RoleRequest::Inactive));
+        let expected = Taken { request: RoleRequest::Inactive, is_forced: true, holds: true };
+        assert_eq!(control.take_request(), Some(expected));
     }
 }

@@ -26,6 +26,8 @@ use ringcat_link::heartbeat::Heartbeat;
 use ringcat_link::interface;
 use ringcat_link::process::{Peer, watch_peer};
 
+use super::{NotReady, RoleControl};
+
 pub use watch::Ending;
 use watch::{Order, RELEASED, UNTIMED};
 
@@ -91,6 +93,8 @@ pub struct Guard {
     stream: UnixStream,
     heartbeat: Arc<Heartbeat>,
     limit: Duration,
+    /// Of the MainDevice that it protects.
+    control: Option<RoleControl>,
 }
 
 /// Beats for a [`Guard`], from any thread.
@@ -121,7 +125,7 @@ impl Guard {
         let child = command.spawn()?;
         // The far end must be open in the guard alone.
         drop(command);
-        let mut guard = Guard { child, stream, heartbeat, limit };
+        let mut guard = Guard { child, stream, heartbeat, limit, control: None };
         let order = Order::in_words(interfaces, limit);
         descriptors::send(&guard.stream, order.as_bytes(), &[guard.heartbeat.as_fd().as_raw_fd()])?;
         guard.await_answer()?;
@@ -142,6 +146,20 @@ impl Guard {
         let mut words = String::new();
         (&self.stream).take(LONGEST).read_to_string(&mut words)?;
         Err(GuardError::Refused(words))
+    }
+
+    /// This guard protects the MainDevice of a role control: [`NotReady::GUARD`] is no reason against its readiness, as
+    /// long as this guard is there.
+    pub fn protect(&mut self, control: &RoleControl) {
+        control.set_not_ready(NotReady::GUARD.0, false);
+        self.control = Some(control.clone());
+    }
+
+    /// [`NotReady::GUARD`] is a reason again.
+    fn protects_no_longer(&self) {
+        if let Some(control) = &self.control {
+            control.set_not_ready(NotReady::GUARD.0, true);
+        }
     }
 
     /// This process runs. False if the guard has acted: the interfaces are off, and the program is to end. No system
@@ -170,7 +188,11 @@ impl Guard {
 
     /// Whether the guard is there. It has ended where it has acted, or where it was killed.
     pub fn is_there(&mut self) -> bool {
-        matches!(self.child.try_wait(), Ok(None))
+        let is_there = matches!(self.child.try_wait(), Ok(None));
+        if !is_there {
+            self.protects_no_longer();
+        }
+        is_there
     }
 
     /// The guard ends and does not act: the interfaces are off, or are to stay as they are.
@@ -182,6 +204,7 @@ impl Guard {
 
 impl Drop for Guard {
     fn drop(&mut self) {
+        self.protects_no_longer();
         // The end of the stream, unless it was released.
         let _ = self.stream.shutdown(std::net::Shutdown::Both);
         let until = Instant::now() + END;

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use ringcat_engine::event::CyclicStandbyEvent;
 use ringcat_engine::link::Link;
-use ringcat_engine::main_device::{ActivateError, Declaration, PartnerStatus};
+use ringcat_engine::main_device::{ActivateError, Declaration, MainDeviceRole, PartnerStatus};
 use ringcat_engine::role::{RoleControl, RoleRequest};
 use ringcat_engine::time::Instant;
 use ringcat_engine::{Scan, ScanError};
@@ -32,7 +32,8 @@ pub enum Next {
     Listen,
     /// There is an ACTIVE of which all is known: [`MainDevice::follow`].
     Follow,
-    /// There is no ACTIVE: [`MainDevice::become_active`], and then a scan or [`MainDevice::bring_up`].
+    /// There is no ACTIVE, or the role was requested: [`MainDevice::become_active`], and then a scan or
+    /// [`MainDevice::bring_up`].
     BecomeActive,
 }
 
@@ -47,11 +48,11 @@ pub struct Joining {
 }
 
 impl Joining {
-    /// Begins to listen. The policy decides whether it is in permanent standby; from then on [`RoleControl::hold`]
-    /// does.
+    /// Begins to listen. The policy decides whether it is in permanent standby, unless [`RoleControl::hold`] has done
+    /// so before; from then on that does.
     pub fn begin<L: Links>(main_device: &MainDevice<L>, policy: &Policy) -> Joining {
         let control = main_device.role_control();
-        control.hold(!policy.takes_over);
+        control.begin_held(!policy.takes_over);
         Joining::on(&main_device.links, control, policy)
     }
 
@@ -80,6 +81,10 @@ impl Joining {
     }
 
     pub(crate) fn decide(&mut self, partner: &PartnerStatus, has_link: bool, now: Instant) -> Next {
+        // The role was requested, also in permanent standby, and whatever the other MainDevice does.
+        if self.control.role() == MainDeviceRole::Active {
+            return Next::BecomeActive;
+        }
         if !has_link {
             self.silent_since = now;
         }

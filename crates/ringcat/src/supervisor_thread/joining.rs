@@ -63,7 +63,7 @@ impl SupervisorThread {
         };
         let of_two = OfTwo::new(&links, None);
         let control = listener.role_control();
-        control.hold(!policy.takes_over);
+        control.begin_held(!policy.takes_over);
         let mut application = Listening { supervisor: self, links, of_two, listener }.join(policy, declare)?;
         application.set_policy(Some(Policy { takes_over: !control.is_held(), ..*policy }));
         Ok(application)

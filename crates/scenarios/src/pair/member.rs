@@ -91,7 +91,8 @@ struct Shown {
 
 fn exchange(links: HostLinks, board: &Board, listen: Duration, policy: Policy) -> Result<(), Error> {
     let most = if board.frames_per_cycle() > 0 { MAX_ACYCLIC } else { 0 };
-    let options = Options::default().with_standby(StandbyOptions::default().with_max_acyclic(most));
+    let options =
+        Options::default().with_standby(StandbyOptions::default().with_max_acyclic(most).with_needs_guard(false));
     let mut main_device = MainDevice::request(links, &options);
     let mut ethernet = EthernetTraffic::new(&mut main_device);
     let joining = Joining::begin(&main_device, &policy.with_listen(listen));

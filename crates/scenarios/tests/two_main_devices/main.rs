@@ -66,5 +66,5 @@ fn declare(scan: &Scan) -> Declaration {
 fn standby() -> StandbyOptions {
     let mut sizes = MasterSizes::default();
     (sizes.to_inactive, sizes.to_active) = (8, 8);
-    StandbyOptions::default().with_sizes(sizes)
+    StandbyOptions::default().with_sizes(sizes).with_needs_guard(false)
 }

@@ -85,6 +85,27 @@ fn no_requested_role_cuts_off_a_file_that_is_written() {
     assert!(two.left_op.is_empty() && two.went_back.is_empty(), "{}", two.log());
 }
 
+// covers: standby, 9.6, MR-15
+#[test]
+fn a_hold_does_not_begin_where_a_write_keeps_the_role() {
+    let mut two = in_op();
+    let written = write_file(&mut two, 200_000);
+    let control = two.controllers[0].control().clone();
+    control.request_hold(false);
+    two.run(4 * CYCLE);
+    assert_eq!(refused(&two, 0), [MemoryWrite::new(WriteKind::File, false, DRIVE.0)], "{}", two.log());
+    assert!(!control.is_held() && two.active() == Some(0) && written.is_running());
+    control.request_hold(true);
+    two.run(4 * CYCLE);
+    assert!(control.is_held() && two.active().is_none(), "it is forced\n{}", two.log());
+    // Without an application the same, at once.
+    let mut two = Two::new(ring_of(&KINDS, Host::First), declare, standby());
+    let control = two.controllers[1].control().clone();
+    control.request_hold(false);
+    two.run(2 * CYCLE);
+    assert!(control.is_held());
+}
+
 // covers: standby, 9.6
 #[test]
 fn a_forced_role_changes_and_a_takeover_names_what_was_cut_off() {

@@ -144,7 +144,8 @@ pub fn run(mut links: HostLinks, settings: &Settings, shared: &Shared) {
 /// Joins, and runs cycles until the program is killed.
 fn exchange(links: HostLinks, settings: &Settings, shared: &Shared) -> Result<(), Error> {
     let (host, cycle) = (links.host(), settings.cycle);
-    let options = Options::default().with_standby(StandbyOptions::default());
+    // The simulated computer switches its links off.
+    let options = Options::default().with_standby(StandbyOptions::default().with_needs_guard(false));
     let main_device = MainDevice::request(links, &options);
     let mut application = main_device.join(&settings.policy, |scan| automatic(&scan.subdevices, cycle))?;
     let layout = shared.layout.get_or_init(|| Layout::of(&application));

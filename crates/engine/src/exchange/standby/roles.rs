@@ -14,7 +14,7 @@ use crate::exchange::domain::Domain;
 use crate::exchange::flight::CyclicFrame;
 use crate::link::Link;
 use crate::queue::Producer;
-use crate::role::{MainDeviceRole, RoleCause, RoleRequest};
+use crate::role::{MainDeviceRole, RoleCause, RoleRequest, Taken};
 use crate::time::Instant;
 
 /// Acyclic frames of the ACTIVE before may be read for this time after it has handed its role over.
@@ -155,7 +155,7 @@ impl State {
     /// forced: the own write as ACTIVE, that of an ACTIVE which goes on as INACTIVE.
     #[cold]
     fn permitted_request(&mut self, now: Instant, events: &mut Producer) -> Option<RoleRequest> {
-        let (request, is_forced) = self.control.take_request()?;
+        let Taken { request, is_forced, holds } = self.control.take_request()?;
         let is_offered = self.role == MainDeviceRole::Active && self.frames.header.phase != Phase::Goes;
         if is_offered && request == RoleRequest::HandOver {
             // The hand-over is under way; this request may force it.
@@ -170,7 +170,12 @@ impl State {
             (MainDeviceRole::Active, RoleRequest::Active)
             | (MainDeviceRole::Inactive, RoleRequest::Inactive | RoleRequest::HandOver) => None,
         };
-        let Some(write) = write else { return Some(request) };
+        let Some(write) = write else {
+            if holds {
+                self.control.hold(true);
+            }
+            return Some(request);
+        };
         events.push(CyclicStandbyEvent::RoleRefused(write).pack());
         None
     }

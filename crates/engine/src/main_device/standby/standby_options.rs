@@ -19,6 +19,10 @@ pub struct StandbyOptions {
     /// no Ethernet. The ACTIVE sends as many as its own options allow; the INACTIVE answers only if its own value is
     /// not 0.
     pub max_acyclic: u8,
+    /// Whether a guard is needed that switches the interfaces off when this program fails (protocol MR-21). On by
+    /// default: `NotReady::GUARD` is a reason against readiness until a guard protects this MainDevice. Off for links
+    /// that go down with the program, such as simulated ones.
+    pub needs_guard: bool,
 }
 
 impl Default for StandbyOptions {
@@ -28,6 +32,7 @@ impl Default for StandbyOptions {
             yields_without_links: true,
             goes_through_init: false,
             max_acyclic: 0,
+            needs_guard: true,
         }
     }
 }
@@ -51,6 +56,13 @@ impl StandbyOptions {
     #[must_use]
     pub const fn with_max_acyclic(mut self, frames: u8) -> StandbyOptions {
         self.max_acyclic = frames;
+        self
+    }
+
+    /// Sets [`StandbyOptions::needs_guard`].
+    #[must_use]
+    pub const fn with_needs_guard(mut self, needs: bool) -> StandbyOptions {
+        self.needs_guard = needs;
         self
     }
 

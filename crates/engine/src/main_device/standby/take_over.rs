@@ -21,7 +21,7 @@ use crate::main_device::MainDevice;
 use crate::main_device::standby::Collision;
 use crate::procedures::error_statistics::ErrorStatistics;
 use crate::procedures::shared_segment::SegmentData;
-use crate::role::{MainDeviceRole, Partner, RoleCause, RoleRequest};
+use crate::role::{MainDeviceRole, Partner, RoleCause, RoleRequest, Taken};
 use crate::segment::clocks::ClockObservation;
 use crate::segment::member::{MemberView, Phase};
 use crate::segment::setup::Setup;
@@ -99,7 +99,7 @@ impl MainDevice {
 
     /// A requested role takes effect: there is no application whose cycles could take it.
     fn take_request(&mut self, now: Instant) {
-        let Some((request, is_forced)) = self.roles.take_request() else { return };
+        let Some(Taken { request, is_forced, holds }) = self.roles.take_request() else { return };
         let role = match request {
             RoleRequest::Active => MainDeviceRole::Active,
             RoleRequest::Inactive => MainDeviceRole::Inactive,
@@ -109,7 +109,7 @@ impl MainDevice {
             }
         };
         if role == self.role() {
-            return;
+            return self.hold_if(holds);
         }
         let write = match role {
             MainDeviceRole::Inactive => self.memory_write_under_way(),
@@ -120,9 +120,17 @@ impl MainDevice {
             let event = Event::Standby(StandbyEvent::RoleRefused(write));
             self.supervisor.append_event(now, event);
         } else {
+            self.hold_if(holds);
             self.set_role(role);
             let event = StandbyEvent::RoleChanged { role, cause: RoleCause::Requested };
             self.supervisor.append_event(now, Event::Standby(event));
+        }
+    }
+
+    /// Permanent standby begins with a request that was not refused.
+    fn hold_if(&self, holds: bool) {
+        if holds {
+            self.roles.hold(true);
         }
     }
 

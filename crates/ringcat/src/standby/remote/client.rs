@@ -4,7 +4,7 @@ use std::error::Error;
 use std::fmt;
 use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ringcat_control::remote::{LONGEST_ANSWER, RemoteAnswer, RemoteQuery, RemoteRole, RemoteState, decode, encode};
 
@@ -56,6 +56,8 @@ pub struct RemoteClient {
     stream: TcpStream,
     arrived: Vec<u8>,
     program: String,
+    /// Longest time of an answer.
+    limit: Duration,
 }
 
 impl RemoteClient {
@@ -74,9 +76,8 @@ impl RemoteClient {
             .find_map(|address| TcpStream::connect_timeout(&address, limit).map_err(|error| last = error).ok());
         let Some(stream) = connected else { return Err(last.into()) };
         stream.set_nodelay(true)?;
-        stream.set_read_timeout(Some(limit))?;
         stream.set_write_timeout(Some(limit))?;
-        let mut client = RemoteClient { stream, arrived: Vec::new(), program: String::new() };
+        let mut client = RemoteClient { stream, arrived: Vec::new(), program: String::new(), limit };
         match client.ask(&RemoteQuery::Hello { token: token.text().to_owned() })? {
             RemoteAnswer::Welcome(program) => client.program = program,
             other => return Err(unexpected(&other)),
@@ -109,7 +110,8 @@ impl RemoteClient {
         self.order(&RemoteQuery::Request { role, force })
     }
 
-    /// Permanent standby on, which also requests the role INACTIVE, or off.
+    /// Permanent standby on, which also requests the role INACTIVE, or off. Where a write keeps the role, permanent
+    /// standby does not begin.
     ///
     /// # Errors
     /// [`RemoteError`].
@@ -127,7 +129,7 @@ impl RemoteClient {
     fn ask(&mut self, query: &RemoteQuery) -> Result<RemoteAnswer, RemoteError> {
         let message = |error: ringcat_control::WireError| RemoteError::Message(error.to_string());
         self.stream.write_all(&encode(query).map_err(message)?)?;
-        let mut part = [0; PART];
+        let (mut part, end) = ([0; PART], Instant::now() + self.limit);
         loop {
             if let Some((answer, length)) = decode(&self.arrived, LONGEST_ANSWER).map_err(message)? {
                 self.arrived.drain(..length);
@@ -136,6 +138,12 @@ impl RemoteClient {
                     answer => Ok(answer),
                 };
             }
+            // Of the whole answer, in however many parts it comes.
+            let left = end.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Err(io::Error::from(io::ErrorKind::TimedOut).into());
+            }
+            self.stream.set_read_timeout(Some(left))?;
             match self.stream.read(&mut part)? {
                 0 => return Err(io::Error::from(io::ErrorKind::UnexpectedEof).into()),
                 read => self.arrived.extend_from_slice(&part[..read]),

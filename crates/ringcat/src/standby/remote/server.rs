@@ -7,7 +7,7 @@ use std::io;
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::{Builder, JoinHandle, sleep};
+use std::thread::{Builder, JoinHandle, park_timeout};
 use std::time::{Duration, Instant};
 
 use ringcat_control::remote::{RemoteAnswer, RemoteCounters, RemoteQuery, RemoteRole, RemoteState};
@@ -25,12 +25,14 @@ use crate::supervisor_thread::SupervisorThread;
 const STACK_BYTES: usize = 256 << 10;
 /// Shortest cycle.
 const SHORTEST: Duration = Duration::from_millis(1);
+/// Longest one.
+const LONGEST: Duration = Duration::from_secs(1);
 
 /// How clients are answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct RemoteOptions {
-    /// Period at which clients are answered, 10 ms by default, at least 1 ms: the delay of an answer, and the load.
+    /// Period at which clients are answered, 10 ms by default, 1 ms to 1 s: the delay of an answer, and the load.
     pub cycle: Duration,
     /// Most clients at a time, 8 by default. A further one takes the place of the oldest that has not shown its token;
     /// if all have, it is disconnected.
@@ -96,7 +98,7 @@ impl RemoteServer {
             let mut clients = Clients { listener, token, options, connections: Vec::new() };
             while !shared.load(Ordering::Relaxed) {
                 clients.work(&served);
-                sleep(options.cycle.max(SHORTEST));
+                park_timeout(options.cycle.clamp(SHORTEST, LONGEST));
             }
         };
         let thread = Builder::new().name("remote".into()).stack_size(STACK_BYTES).spawn(body).map_err(Error::Thread)?;
@@ -113,6 +115,7 @@ impl Drop for RemoteServer {
     fn drop(&mut self) {
         self.ended.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
+            thread.thread().unpark();
             // The panic handler has reported a panic of the thread.
             let _ = thread.join();
         }
@@ -178,11 +181,12 @@ impl Served {
                 self.request(request, *force)
             }
             RemoteQuery::Hold { held, force } => {
-                self.control.hold(*held);
-                match *held && self.control.role() == MainDeviceRole::Active {
-                    true => self.request(RoleRequest::Inactive, *force),
-                    false => RemoteAnswer::Done,
+                match held {
+                    // A write that keeps the role keeps it from being held, too.
+                    true => self.control.request_hold(*force),
+                    false => self.control.hold(false),
                 }
+                RemoteAnswer::Done
             }
             _ => RemoteAnswer::Refused("no query of this version".to_owned()),
         }

@@ -2,10 +2,11 @@
 
 use std::error::Error;
 use std::fmt;
-use std::fs;
 use std::io::{self, Read};
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
+
+use ringcat_link::process::{effective_user, open_at_once};
 
 /// Shortest token, in bytes.
 const SHORTEST: usize = 16;
@@ -29,6 +30,11 @@ pub enum TokenError {
         /// Its mode.
         mode: u32,
     },
+    /// The file belongs to another user than the one of this process or root.
+    Owner {
+        /// Number of that user.
+        user: u32,
+    },
     /// It is too short, too long, or has other characters.
     Content,
 }
@@ -40,6 +46,7 @@ impl fmt::Display for TokenError {
             TokenError::Readable { mode } => {
                 write!(f, "others may read it (mode {:03o}): chmod 600", mode & 0o777)
             }
+            TokenError::Owner { user } => write!(f, "it belongs to user {user}, neither to the own one nor to root"),
             TokenError::Content => {
                 write!(f, "expected {SHORTEST} to {LONGEST} printable ASCII characters (openssl rand -hex 32)")
             }
@@ -51,7 +58,7 @@ impl Error for TokenError {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         match self {
             TokenError::File(error) => Some(error),
-            TokenError::Readable { .. } | TokenError::Content => None,
+            TokenError::Readable { .. } | TokenError::Owner { .. } | TokenError::Content => None,
         }
     }
 }
@@ -66,12 +73,15 @@ impl RemoteToken {
         if is_right { Ok(RemoteToken(token.to_owned())) } else { Err(TokenError::Content) }
     }
 
-    /// From a regular file to which only its owner has rights. White space around the token is left out.
+    /// From a regular file of the own user or root, to which only its owner has rights. White space around the token is
+    /// left out.
     ///
     /// # Errors
     /// [`TokenError`].
     pub fn from_file(path: &Path) -> Result<RemoteToken, TokenError> {
-        let about = fs::metadata(path).map_err(TokenError::File)?;
+        // Opened once: what is checked is what is read.
+        let file = open_at_once(path).map_err(TokenError::File)?;
+        let about = file.metadata().map_err(TokenError::File)?;
         if !about.is_file() {
             let error = io::Error::new(io::ErrorKind::InvalidInput, "it is no regular file");
             return Err(TokenError::File(error));
@@ -79,8 +89,11 @@ impl RemoteToken {
         if about.mode() & OTHERS != 0 {
             return Err(TokenError::Readable { mode: about.mode() });
         }
+        let own = effective_user();
+        if ![0, own].contains(&about.uid()) {
+            return Err(TokenError::Owner { user: about.uid() });
+        }
         let mut text = String::new();
-        let file = fs::File::open(path).map_err(TokenError::File)?;
         file.take(2 * LONGEST as u64).read_to_string(&mut text).map_err(TokenError::File)?;
         RemoteToken::new(text.trim())
     }
@@ -107,6 +120,7 @@ impl fmt::Debug for RemoteToken {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
     use std::os::unix::fs::PermissionsExt;
 
     use super::*;
@@ -136,7 +150,23 @@ mod tests {
         assert!(refused.to_string().contains("mode 640"), "{refused}");
         mode(0o600);
         assert!(RemoteToken::from_file(&path).is_ok_and(|token| token.is("0123456789abcdef")));
+        // Only root can give a file away.
+        if std::os::unix::fs::chown(&path, Some(65_534), None).is_ok() && effective_user() == 0 {
+            let of_another = RemoteToken::from_file(&path);
+            assert!(matches!(of_another, Err(TokenError::Owner { user: 65_534 })), "{of_another:?}");
+        }
         fs::remove_file(&path).expect("it is there");
         assert!(matches!(RemoteToken::from_file(&path), Err(TokenError::File(_))));
+    }
+
+    // covers: AC-08, standby
+    #[test]
+    fn a_pipe_is_no_token_and_its_writer_is_not_awaited() {
+        let path = std::env::temp_dir().join(format!("ringcat-token-pipe-{}", std::process::id()));
+        let made = std::process::Command::new("mkfifo").args(["-m", "600"]).arg(&path).status();
+        assert!(made.is_ok_and(|made| made.success()), "mkfifo is there");
+        let refused = RemoteToken::from_file(&path).expect_err("it is no regular file");
+        fs::remove_file(&path).expect("it is there");
+        assert!(refused.to_string().contains("no regular file"), "{refused}");
     }
 }
