@@ -206,8 +206,11 @@ impl Bus {
         };
         let ownership = owned.as_ref().map(|owned| owned.ownership().clone());
         let followed = Followed::new(supervisor.clone()).with_ownership(ownership.clone());
-        let record = taps.map(|taps| FrameRecord::start(&taps, master, names, settings.debug_ring.clone()));
-        let record = record.transpose().map_err(|error| error.to_string())?;
+        let record = taps.and_then(|taps| {
+            let started = FrameRecord::start(&taps, master, names, settings.debug_ring.clone());
+            // The application runs without it.
+            started.inspect_err(|error| report(format_args!("frames are not kept: {error}{}", memory_hint()))).ok()
+        });
         let followed = followed.with_cyclic_lines(settings.prints_cyclic_lines).with_record(record);
         let log = BusLog::start(followed, realtime::leave, move |priority, line| match master {
             0 => report_as(priority, format_args!("{line}")),

@@ -74,7 +74,7 @@ impl Driving {
         let (cyclic, acyclic) = adopted.map_err(|error| error.to_string())?;
         let main_address = acyclic.addresses().main.0;
         let acyclic = QuietLinks::new(acyclic, cyclic, lasting.listened.clone(), opened.clone());
-        let (acyclic, record) = recorded(acyclic, opened, lasting, handover)?;
+        let (acyclic, record) = recorded(acyclic, opened, lasting, handover);
         let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
         let options = options_with(lasting.settings, &options).with_dictionaries(true);
         let supervisor = match Knowledge::from_bytes(lasting.knowledge) {
@@ -158,19 +158,25 @@ fn recorded<L: Links>(
     opened: &Opened,
     lasting: &Lasting<'_>,
     handover: Handover,
-) -> Result<(Tee<L>, Option<FrameRecord>), String> {
+) -> (Tee<L>, Option<FrameRecord>) {
     let ring = &lasting.settings.debug_ring;
     if !ring.is_on {
-        return Ok((Tee::new(links, None), None));
+        return (Tee::new(links, None), None);
     }
     let names = opened.links().names();
     let taps = Taps::new(names.len());
-    let record = FrameRecord::start(&taps, lasting.number, names, ring.clone());
-    let mut record = record.map_err(|error| error.to_string())?.with_last_written(lasting.last_written.clone());
+    let mut record = match FrameRecord::start(&taps, lasting.number, names, ring.clone()) {
+        Ok(record) => record.with_last_written(lasting.last_written.clone()),
+        Err(error) => {
+            // The master is driven without it.
+            say(format_args!("master {}: frames are not kept: {error}", lasting.number));
+            return (Tee::new(links, None), None);
+        }
+    };
     if handover == Handover::AfterCrash && !lasting.knowledge.is_empty() {
         record.note(RecordReason::OwnerLost, Instant::now());
     }
-    Ok((Tee::new(links, taps.tap_with(QUEUE)), Some(record)))
+    (Tee::new(links, taps.tap_with(QUEUE)), Some(record))
 }
 
 /// Waits until no SubDevice changes its state any more, and until the PDOs of dictionaries are read that are about to

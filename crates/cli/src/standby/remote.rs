@@ -125,6 +125,9 @@ pub fn run(arguments: &ClientArguments) -> Result<Report, Failure> {
     let token = read_token(token)?;
     let failed = |error: RemoteError| Failure::new(format!("{address}: {error}"));
     let mut client = RemoteClient::connect(address.as_str(), &token, *limit).map_err(failed)?;
+    if *order == Order::HandOver && !client.state().map_err(failed)?.is_active {
+        return Err(Failure::new(format!("{address}: it is INACTIVE, and only the ACTIVE hands its role over")));
+    }
     match order {
         Order::State => Ok(()),
         Order::Active => client.request(RemoteRole::Active, *force),

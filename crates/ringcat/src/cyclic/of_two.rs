@@ -75,8 +75,8 @@ impl Cyclic {
     pub fn set_policy(&mut self, policy: Option<Policy>, links: &impl Links) {
         let (period, main) = (self.period(), links.addresses().main);
         if let Some(control) = self.exchange.role_control() {
-            let is_held = policy.is_some_and(|policy| !policy.takes_over);
-            control.hold(is_held);
+            // What was decided by a request lasts longer than a policy.
+            control.begin_held(policy.is_some_and(|policy| !policy.takes_over));
         }
         self.of_two.watch = policy.map(|policy| Watch::new(policy, period, main, links.now()));
     }

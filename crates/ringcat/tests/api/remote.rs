@@ -128,8 +128,16 @@ fn both_controllers_are_asked_and_switched_over_tcp() {
     // Notification 2: hot standby.
     first.client.hold(false, false).expect("it is permitted");
     until("both are ready again", || [first.state(), second.state()].iter().all(|state| not_ready(state).is_empty()));
-    second.client.request(RemoteRole::HandOver, false).expect("it is sent");
-    until("the role is handed back", || first.state().is_active && !second.state().is_active);
+    let mut looks = 0;
+    until("the role is handed back", || {
+        let [first, is_active] = [first.state().is_active, second.state().is_active];
+        // A request is refused while the other one is late, as on a busy machine.
+        if is_active && looks % 100 == 0 {
+            second.client.request(RemoteRole::HandOver, false).expect("it is sent");
+        }
+        looks += 1;
+        first && !is_active
+    });
     until("all are in OP", || in_op(&first.state()) && in_op(&second.state()));
     drop((first.server, second.server));
     drop((first.cycles.end(), second.cycles.end()));
