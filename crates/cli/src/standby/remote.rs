@@ -89,7 +89,7 @@ pub struct ClientArguments {
     limit: Duration,
 }
 
-/// What is wanted of the MainDevice.
+/// A query or a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Order {
     /// Its state
@@ -119,7 +119,7 @@ impl Order {
     }
 }
 
-/// Asks a MainDevice, and waits until a request has taken effect.
+/// Sends a query or a request to a MainDevice, and waits until a request has taken effect.
 pub fn run(arguments: &ClientArguments) -> Result<Report, Failure> {
     let ClientArguments { address, order, token, force, limit } = arguments;
     let token = read_token(token)?;

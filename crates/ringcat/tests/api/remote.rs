@@ -205,7 +205,7 @@ fn bytes_of_any_kind_cost_a_bounded_time_and_end_the_connection() {
         let _ = stream.write_all(&bytes);
         assert!(is_ended(&mut stream, LIMIT), "{:02x?}", &bytes[..bytes.len().min(16)]);
     }
-    // One that asks a lot at once gets one answer in each cycle of the server, and others get theirs.
+    // A client with many queries at once gets one answer in each cycle of the server, and others get theirs.
     let mut greedy = TcpStream::connect(server.address()).expect("it listens");
     let message = |query: RemoteQuery| encode(&query).expect("it is short");
     let hello = message(RemoteQuery::Hello { token: "a-token-of-the-test".to_owned() });

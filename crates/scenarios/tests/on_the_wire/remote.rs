@@ -1,4 +1,4 @@
-//! Two controllers that hand their role over on a schedule, and that are asked and switched over TCP.
+//! Two controllers that hand their role over on a schedule; their state is read and their roles are switched over TCP.
 
 use std::fs;
 use std::os::unix::fs::OpenOptionsExt;
