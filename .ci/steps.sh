@@ -28,8 +28,8 @@ root_layer() {
     readers_of_packages
 }
 
-# What reads the files of packages that are made for it, where apt-get has it. The checks that need one say if they are
-# skipped.
+# Installs the tools with which files of packages are checked, where apt-get has them. A check that is skipped because
+# of a missing tool prints that.
 readers_of_packages() {
     local tool missing=()
     declare -A package=([cmake]=cmake [lintian]=lintian [mandoc]=mandoc [groff]=groff-base [shellcheck]=shellcheck
@@ -68,7 +68,7 @@ on_the_wire() {
     mapfile -t with_bars < <(tests_with_bars crates/ringcatd/tests/ownership)
     [[ ${#with_bars[@]} != 0 ]] || { echo "no test of the daemon has a bar"; return 1; }
     tried wire
-    # Of these the step before has shown all but the bars, which hold on a machine that has nothing else to do.
+    # The step before has run all of these, without the bars, which hold only on a machine without other load.
     tried ownership "${with_bars[@]}"
     tried on_the_wire
     tried tool a_list_of_100_slaves a_segment_that_cannot_be_scanned siis_of_100_slaves

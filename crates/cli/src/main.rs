@@ -145,7 +145,7 @@ enum Command {
     #[cfg(feature = "standby")]
     #[command(hide = true)]
     StandbyGuard(standby::guarding::GuardArguments),
-    /// Asks a `ringcat standby --remote` for its state, or for another role
+    /// Prints the state of a `ringcat standby --remote`, or requests another role
     ///
     /// It waits until a request has taken effect.
     #[cfg(feature = "standby")]

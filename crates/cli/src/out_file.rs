@@ -1,4 +1,4 @@
-//! A file that a command makes: what exists is replaced with `--overwrite` only.
+//! The output file of a command: an existing file is replaced with `--overwrite` only.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
@@ -25,7 +25,7 @@ impl Overwrite {
         }
     }
 
-    /// Writes the file. One that has come since is not replaced either.
+    /// Writes the file. A file that was created since then is not replaced either.
     pub fn write(self, out: &Path, bytes: &[u8]) -> Result<(), Failure> {
         let written = self.open(out).and_then(|mut file| file.write_all(bytes));
         written.map_err(|error| Failure::new(format!("{} cannot be written: {error}", out.display())))
@@ -34,7 +34,7 @@ impl Overwrite {
     fn open(self, out: &Path) -> io::Result<File> {
         let mut opening = OpenOptions::new();
         match Target::of(out) {
-            // What a redirected output has already stays.
+            // The earlier content of a redirected output stays.
             Target::Stream => opening.append(true),
             Target::Nothing | Target::File => {
                 opening.write(true).truncate(true).create(true).create_new(!self.overwrite)

@@ -3,7 +3,7 @@
 //! * [`message`]: their contents;
 //! * [`information`]: the present state of a segment;
 //! * [`tool`]: data of a master, its SubDevices and its application;
-//! * [`settings`]: what holds for whatever drives a master;
+//! * [`settings`]: settings of a master, for the daemon and for applications;
 //! * [`refusal`]: why a request is refused, in one sentence;
 //! * [`wire`]: messages as bytes, and any bytes as a message or an error;
 //! * [`connection`]: messages and descriptors over a Unix socket;

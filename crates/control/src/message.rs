@@ -332,7 +332,7 @@ pub struct HandedBus {
     pub can_switch: bool,
     /// Level of messages: 0 to 2, above as 2 ([`ToolQuery::SetDebugLevel`]). It outlasts hand-overs.
     pub debug_level: u32,
-    /// What holds for whatever drives the master.
+    /// Settings, for the daemon and for applications.
     pub settings: BusSettings,
 }
 

@@ -1,7 +1,7 @@
 //! Remote access to one of two MainDevices (protocol AC-08, REQ037): messages over TCP.
 //!
-//! A header of 12 bytes, then CBOR (RFC 8949): the magic `RCRA`, the version, two zero bytes, the length, little
-//! endian.
+//! A header of 12 bytes (the magic `RCRA`, the version, two zero bytes, the length, little endian), then CBOR
+//! (RFC 8949).
 //! A client sends [`RemoteQuery::Hello`] with the token, then one query after the other; each has one answer. Any bytes
 //! are allowed: decoding never panics, and takes no more memory than a small multiple of the limit.
 
@@ -22,16 +22,16 @@ pub const LONGEST_ANSWER: usize = 1 << 20;
 const HEADER: usize = 12;
 const MAGIC: [u8; 4] = *b"RCRA";
 
-/// What a client says. Its `Debug` leaves the token out.
+/// What a client sends. Its `Debug` leaves the token out.
 #[derive(Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum RemoteQuery {
-    /// First message: what shows that the client may ask.
+    /// First message: the token, without which no query is answered.
     Hello {
         /// The token.
         token: String,
     },
-    /// What this MainDevice is and knows.
+    /// Requests the state of this MainDevice.
     State,
     /// Requests a role.
     Request {
@@ -40,12 +40,12 @@ pub enum RemoteQuery {
         /// Also while a write into the memory of a SubDevice is under way.
         force: bool,
     },
-    /// Permanent standby on (notification 1 of protocol 9.10, which also requests the role INACTIVE) or off
+    /// Switches permanent standby on (notification 1 of protocol 9.10, which also requests the role INACTIVE) or off
     /// (notification 2).
     Hold {
         /// On.
         held: bool,
-        /// The role also while a write into the memory of a SubDevice is under way.
+        /// Requests the role also while a write into the memory of a SubDevice is under way.
         force: bool,
     },
 }

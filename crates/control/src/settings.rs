@@ -1,4 +1,4 @@
-//! Settings of a master that hold for whatever drives it: the daemon, and applications, which get them with the bus.
+//! Settings of a master, for the daemon and for applications, which get them with the bus.
 //!
 //! They are what the switches of `configure` in the manual of the IgH EtherCAT Master (table 9.1) decide, with its
 //! defaults. Their names are those of variables, in the configuration of the daemon and in the environment of a program
@@ -22,7 +22,7 @@ pub struct BusSettings {
     pub reads_alias_register: bool,
     /// The EEPROM is assigned to the PDI while a SubDevice goes to PREOP (`enable-sii-assign`).
     pub assigns_sii: bool,
-    /// Lines about what cyclic frames show are printed (`enable-rt-syslog`).
+    /// Lines about working counters and lost datagrams of cyclic frames are printed (`enable-rt-syslog`).
     pub prints_cyclic_lines: bool,
     /// The last seconds before a fault are recorded (`enable-debug-ring`).
     pub debug_ring: DebugRing,

@@ -6,8 +6,8 @@
  * functions with their return codes. Functions return 0 or a value, and a negative error number if they fail.
  *
  * The phases of a handle: it is opened (ecrt_open_master()), reserved (ecrt_request_master(), ecrt_master_reserve()),
- * active (ecrt_master_activate()), and reserved again after the deactivation (ecrt_master_deactivate()). In another
- * phase than the named ones functions return what their list of codes says, and change nothing.
+ * active (ecrt_master_activate()), and reserved again after the deactivation (ecrt_master_deactivate()). In any other
+ * phase than those it names a function returns a code of its list, and changes nothing.
  *
  * After an internal error each function returns -EIO (NULL, 0, EC_REQUEST_ERROR) for the master in which it happened,
  * until ecrt_release_master(); a line on standard error names the reason.
@@ -226,9 +226,9 @@ EC_PUBLIC_API int ecrt_master(ec_master_t *master, ec_master_info_t *master_info
 /** Starts the application with what was declared, and gives the domains their memory. It returns at once:
   * SubDevices go to OP while the program cycles. After an error another activation may follow.
   * Phases: reserved; while the application is active it does nothing.
-  * @return 0; -EINVAL: the declaration does not fit the bus (a line says why), or the handle has ended or is NULL;
-  *         -EPERM: the master was opened only; -EBUSY: a cyclic call of another thread does not end; -ENODEV: the
-  *         daemon has taken the bus back, or the acyclic half has ended. */
+  * @return 0; -EINVAL: the declaration does not fit the bus (a line has the reason), or the handle has ended or is
+  *         NULL; -EPERM: the master was opened only; -EBUSY: a cyclic call of another thread does not end; -ENODEV:
+  *         the daemon has taken the bus back, or the acyclic half has ended. */
 EC_PUBLIC_API int ecrt_master_activate(ec_master_t *master);
 /** Sets the time of the application in nanoseconds since 2000; it wraps, and 0 is no time. The first one aligns
   * SYNC pulses. Call it once in a cycle, with the time at which the cycle was to begin.
@@ -386,7 +386,7 @@ EC_PUBLIC_API int ecrt_master_select_reference_clock(ec_master_t *master, ec_sla
   *         the bus back; -EINVAL: the handle has ended or is NULL. */
 EC_PUBLIC_API int ecrt_master_send(ec_master_t *master);
 /** Microseconds from one ecrt_master_send() to the next: frames that are sent again have to be back before its end.
-  * 0, or no call: 1000, or the shortest period of a network file.
+  * 0, or no call: the shortest period of a network file; without one 1000.
   * Phases: reserved, before the activation.
   * @return 0; -EBUSY: the application is active; -EPERM: the master was opened only; -EINVAL: the handle has ended
   *         or is NULL. */
@@ -451,7 +451,7 @@ EC_PUBLIC_API int ecrt_master_write_idn(
         uint16_t *error_code);
 /** Opens a master for information and mailboxes, beside the program that has reserved it.
   * Phases: none is needed.
-  * @return the master, for ecrt_release_master(); NULL: there is no such master (a line says why). */
+  * @return the master, for ecrt_release_master(); NULL: there is no such master (a line has the reason). */
 EC_PUBLIC_API ec_master_t *ecrt_open_master(unsigned int master_index);
 /** Ends the application of this handle, and the handle with all that came from it. The bus goes back to the daemon.
   * A second call does nothing.
@@ -460,8 +460,8 @@ EC_PUBLIC_API void ecrt_release_master(ec_master_t *master);
 /** Opens a master and reserves it. Returns once the bus is scanned; SubDevices may still be on their way to PREOP,
   * and what needs a mailbox waits for that.
   * Phases: none is needed.
-  * @return the master, for ecrt_release_master(); NULL: there is no such master, or it is reserved (a line says
-  *         why). */
+  * @return the master, for ecrt_release_master(); NULL: there is no such master, or it is reserved (a line has
+  *         the reason). */
 EC_PUBLIC_API ec_master_t *ecrt_request_master(unsigned int master_index);
 /** Version of the interface of the library.
   * Phases: any.

@@ -15,7 +15,7 @@ use crate::environment::Source;
 /// kind, or a simulated segment. Each cycle tests the kind several times, so each kind occurs once.
 pub type AnyLinks = Tee<EitherLinks<DaemonLinks, SharedSegment>>;
 
-/// Memory for frames on their way to a record: those of a tenth of a second.
+/// Memory for frames on their way to a record, in which a frame stays for up to 200 ms.
 const QUEUE: usize = 4 << 20;
 
 /// The links of one half of a daemon's bus, and its tap; without one no frame is recorded.

@@ -65,7 +65,7 @@ impl<T> Claim<T> {
     /// if nothing has failed.
     pub fn recover(&self, other: T) -> Option<T> {
         self.has_failed.swap(false, Ordering::AcqRel).then(|| {
-            // SAFETY: the claim is taken still, and its taker has gone; of several callers the swap admits one.
+            // SAFETY: the claim is still taken, and its caller has ended; of several callers the swap admits one.
             let failed = std::mem::replace(unsafe { &mut *self.value.get() }, other);
             self.is_taken.store(false, Ordering::Release);
             failed

@@ -31,8 +31,8 @@ impl Live {
     /// From now on the words of this bus are read.
     ///
     /// # Errors
-    /// [`Code::GONE`]: the acyclic half has ended, and there are no words any more. A line says so, unless the daemon
-    /// has taken the bus back, which has a line of its own.
+    /// [`Code::GONE`]: the acyclic half has ended, and there are no words any more. A line reports it, unless the
+    /// daemon has taken the bus back, which has a line of its own.
     pub fn follow(&self, bus: &Bus, found: usize, is_ring: bool) -> Outcome {
         let (supervisor, ownership) = (bus.supervisor(), bus.ownership());
         let asked = supervisor.live_status().and_then(|status| Ok((status, supervisor.create_retry_request()?)));

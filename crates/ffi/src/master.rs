@@ -298,7 +298,7 @@ impl Master {
         self.application_time.store(0, Ordering::Relaxed);
         *locked(&self.given) = GivenTimes::default();
         self.is_active.store(false, Ordering::Release);
-        // Nothing is known of SubDevices once the acyclic half has ended; a line says so.
+        // The states of SubDevices are not known once the acyclic half has ended; a line reports it.
         let _ = self.live.follow(&bus, 0, false);
         draft.set_found(bus.found().unwrap_or_default());
         Ok(())

@@ -98,7 +98,7 @@ fn set_of(signals: &[JobSignal]) -> libc::sigset_t {
 }
 
 fn change(how: i32, signals: &[JobSignal]) {
-    // SAFETY: the pointer is to a live set, and no old mask is asked for.
+    // SAFETY: the pointer is to a live set, and no old mask is requested.
     unsafe { libc::pthread_sigmask(how, &set_of(signals), std::ptr::null_mut()) };
 }
 

@@ -33,9 +33,11 @@ pub struct Options {
     /// read in the background afterwards, or by [`Services::complete_siis`](crate::Services::complete_siis) when it is
     /// needed.
     pub sii_extent: Option<SiiExtent>,
-    /// Where the aliases of SubDevices are read.
+    /// Where the aliases of SubDevices are read, by default in register STATION_ALIAS (0x0012). On a bus of a daemon
+    /// the settings of the daemon apply instead.
     pub alias_source: AliasSource,
-    /// When the EEPROMs of SubDevices belong to their PDIs.
+    /// When the EEPROMs of SubDevices belong to their PDIs, by default on the way to PREOP. On a bus of a daemon the
+    /// settings of the daemon apply instead.
     pub sii_assignment: SiiAssignment,
     /// Dictionaries read for PDOs. `None`: [`ReadPdos::Missing`], in PREOP with idle operation [`ReadPdos::Always`].
     pub pdos: Option<ReadPdos>,

@@ -28,7 +28,7 @@ const SETTLE: Duration = Duration::from_secs(3);
 const STILL: Duration = Duration::from_millis(100);
 /// SubDevices reach their safe state within this time.
 const LEAD: Duration = Duration::from_secs(10);
-/// Memory for frames on their way to the record: those of a tenth of a second.
+/// Memory for frames on their way to the record, in which a frame stays for up to 200 ms.
 const QUEUE: usize = 4 << 20;
 /// Interval at which the progress of a scan is read.
 const LOOK: Duration = Duration::from_millis(1);
@@ -46,7 +46,7 @@ pub struct Lasting<'a> {
     pub last_written: LastWritten,
     /// Level of messages.
     pub debug_level: u32,
-    /// What holds for whatever drives the master.
+    /// Settings, for the daemon and for applications.
     pub settings: &'a BusSettings,
     /// Network interfaces of EoE; `None`: there are none.
     pub interfaces: Option<Arc<EthernetInterfaces>>,
@@ -151,8 +151,8 @@ impl Driving {
     }
 }
 
-/// Links whose frames are recorded for a file at a fault, where that is wanted. The end of an application without a
-/// release is a fault that has just been.
+/// Links whose frames are recorded for a file at a fault, if the settings require it. The end of an application without
+/// a release is such a fault.
 fn recorded<L: Links>(
     links: L,
     opened: &Opened,

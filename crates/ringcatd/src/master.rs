@@ -44,7 +44,7 @@ pub struct Settings {
     pub interfaces: Option<EthernetInterfaces>,
     /// Level of messages at the beginning.
     pub debug_level: u32,
-    /// What holds for whatever drives it.
+    /// Settings, for the daemon and for applications.
     pub bus: BusSettings,
 }
 
@@ -75,7 +75,7 @@ pub struct Master {
     last_written: LastWritten,
     /// Level of messages, whatever drives the master.
     debug_level: AtomicU32,
-    /// What holds for whatever drives it.
+    /// Settings, for the daemon and for applications.
     bus: BusSettings,
     others: Others,
 }

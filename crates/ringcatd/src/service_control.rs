@@ -38,7 +38,7 @@ const LOOK: Duration = Duration::from_millis(100);
 /// Exit code of the LSB for a service that does not run.
 const NOT_RUNNING: u8 = 3;
 
-/// Starts and stops EtherCAT masters, and says how they are.
+/// Starts and stops EtherCAT masters, and reports their state.
 #[derive(Debug, Parser)]
 #[command(name = NAME, version, max_term_width = 100)]
 struct Arguments {
@@ -57,9 +57,9 @@ enum Verb {
     Stop,
     /// Stop, then start
     Restart,
-    /// Says what drives each master; exit code 3 if ringcatd does not run
+    /// Reports what drives each master; exit code 3 if ringcatd does not run
     Status,
-    /// Says what of the configuration was understood; changes nothing
+    /// Reports the settings of the configuration and its mistakes; changes nothing
     Check,
 }
 
@@ -183,7 +183,7 @@ fn status(conf: &Path) -> Result<ExitCode, String> {
         Err(error) => return Err(error.to_string()),
     };
     let Ok((Answer::Masters(masters), _)) = client.ask(0, Query::Masters, Vec::new()) else {
-        return Err("ringcatd does not say which masters it has".to_owned());
+        return Err("ringcatd does not report its masters".to_owned());
     };
     for MasterState { master, links, owner, fault, .. } in masters {
         let state = match (owner, fault) {
@@ -245,7 +245,7 @@ fn wait_until_ready(ready: &UnixDatagram, child: &mut Child) -> Result<ExitCode,
             Err(error) => return Err(error.to_string()),
         }
         if let Ok(Some(status)) = child.try_wait() {
-            return Err(format!("ringcatd has ended ({status}); the log of the system says why"));
+            return Err(format!("ringcatd has ended ({status}); see the log of the system"));
         }
     }
     Err(format!("ringcatd is not ready after {} s; it runs (process {})", START.as_secs(), child.id()))

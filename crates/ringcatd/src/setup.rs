@@ -78,7 +78,7 @@ pub struct Setup {
     pub up_down: Vec<String>,
     /// Level of messages at the beginning.
     pub debug_level: u32,
-    /// What holds for whatever drives a master.
+    /// Settings of the masters, for the daemon and for applications.
     pub bus: BusSettings,
     /// A master waits until its backup interface is there.
     pub needs_backup: bool,

@@ -24,7 +24,7 @@ pub struct SubDevice {
     pub position: u16,
     /// Station address that the scan has given it
     pub station: u16,
-    /// Station alias of its EEPROM; 0: none
+    /// Station alias, of register 0x0012 or, on a bus of a daemon, usually of its EEPROM; 0: none
     pub alias: u16,
     /// Name of its EEPROM, else of its description (`--esi`)
     pub name: String,

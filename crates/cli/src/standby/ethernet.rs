@@ -77,7 +77,7 @@ impl Ethernet {
             }
             Some(at) if now >= at => match supervisor.start_partner_interface(name, self.mac) {
                 Ok(interface) => {
-                    events.say(now, &format!("{name}: made again; it needs its IP address again"));
+                    events.say(now, &format!("{name}: created again; it needs its IP address again"));
                     (self.interface, self.again_at, self.is_up) = (interface, None, false);
                 }
                 // Its name may be taken for a moment.

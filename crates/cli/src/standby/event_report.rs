@@ -21,7 +21,7 @@ pub struct EventReport {
     pub seen: Takeover,
     /// Why the role was not handed over.
     pub refused: Option<String>,
-    /// Why this MainDevice has become INACTIVE last.
+    /// Why this MainDevice last became INACTIVE.
     pub cause: Option<RoleCause>,
     /// How the configuration of the other MainDevice differs.
     pub difference: Option<String>,

@@ -75,7 +75,7 @@ pub struct ClientArguments {
     /// Address and port of --remote there
     #[arg(value_name = "ADDR:PORT")]
     address: String,
-    /// What is wanted
+    /// What to do
     #[arg(value_enum, default_value = "state")]
     order: Order,
     /// File with the token
@@ -89,7 +89,7 @@ pub struct ClientArguments {
     limit: Duration,
 }
 
-/// What is wanted of the MainDevice.
+/// A query or a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Order {
     /// Its state
@@ -119,7 +119,7 @@ impl Order {
     }
 }
 
-/// Asks a MainDevice, and waits until a request has taken effect.
+/// Sends a query or a request to a MainDevice, and waits until a request has taken effect.
 pub fn run(arguments: &ClientArguments) -> Result<Report, Failure> {
     let ClientArguments { address, order, token, force, limit } = arguments;
     let token = read_token(token)?;
@@ -147,7 +147,7 @@ pub fn run(arguments: &ClientArguments) -> Result<Report, Failure> {
     let role = if state.is_active { "ACTIVE" } else { "INACTIVE" };
     let verdict = match order.is_done(&state) {
         true => Verdict::Held(format!("{role}, {}", readiness(&state))),
-        false => Verdict::Failed(format!("it is {role} still after 2 s, {}; its log says why", readiness(&state))),
+        false => Verdict::Failed(format!("it is {role} still after 2 s, {}; see its log", readiness(&state))),
     };
     Ok(Report { verdict, data: Data::Remote(Remote::new(client.program(), &state)) })
 }

@@ -1,8 +1,8 @@
 //! Switchovers on a schedule, as proof that the other controller can take over (`--switch-every`).
 //!
-//! In: the time, the role, whether a failure of one controller is survived now, and why a request was refused.
-//! Out: what is to be done or said. The ACTIVE hands its role over; the new ACTIVE, with the same option, hands it back
-//! in its turn.
+//! Input: the time, the role, whether a failure of one controller would be tolerated now, why a request was refused.
+//! Output: what is to be done or reported. The ACTIVE hands its role over; the new ACTIVE, with the same option, hands
+//! it back in its turn.
 
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ use crate::times::{in_words, time};
 
 /// The other MainDevice has this long to take the role.
 pub const HAND_OVER_LIMIT: Duration = Duration::from_secs(1);
-/// That it has not done so.
+/// The reason if it has not taken it.
 pub const NOT_TAKEN: &str = "the other MainDevice did not take the role";
 /// Shortest time between two switchovers.
 const SHORTEST: Duration = Duration::from_secs(1);
@@ -25,25 +25,25 @@ pub fn every(text: &str) -> Result<Duration, String> {
     if every >= SHORTEST { Ok(every) } else { Err(format!("expected {} or more", in_words(SHORTEST))) }
 }
 
-/// Where it is.
+/// State of the schedule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     /// The other MainDevice is ACTIVE.
     Inactive,
-    /// The next switchover is due then.
+    /// ACTIVE until the next switchover, which is due at this time.
     Waits { due: Instant },
     /// The role was offered.
     Asked { at: Instant },
 }
 
-/// What follows.
+/// The next step.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Step {
     /// Request the hand-over.
     Request,
     /// The role was handed over, this long after the request.
     Done(Duration),
-    /// It was not, and why.
+    /// It was not handed over, and why.
     Refused(String),
     /// It was not taken in time: the offer is to be withdrawn.
     Withdraw,
@@ -63,8 +63,8 @@ impl Schedule {
         Schedule { every, state: State::Inactive, seen: Switchovers::default() }
     }
 
-    /// What follows now. `answers`: why the last request was refused, which is taken, and why this MainDevice has
-    /// become INACTIVE since the request.
+    /// The next step, if there is one now. The last argument: why the last request was refused, which is taken out, and
+    /// why this MainDevice has become INACTIVE since the request.
     pub fn step(
         &mut self,
         now: Instant,

@@ -17,7 +17,7 @@ fn a_device_or_an_output_is_written_and_a_link_is_not_replaced() {
     assert_eq!(skeleton("/dev/null").code, Some(0));
     let shown = skeleton("/dev/stdout");
     assert!(shown.code == Some(0) && shown.out.contains("ProductCode"), "{}", shown.all());
-    // What a redirected output has already stays.
+    // The earlier content of a redirected output stays.
     fs::write(place.path("log"), "before\n").expect("it is writable");
     let log = File::options().append(true).open(place.path("log")).expect("it is writable");
     let mut command = Command::new(env!("CARGO_BIN_EXE_ringcat"));

@@ -8,11 +8,11 @@ use super::value::{number, yes_or_no};
 
 /// Longest time that is recorded, in seconds.
 const MOST_SECONDS: u32 = 3600;
-/// Least and most memory.
+/// Limits of the memory.
 const BYTES: std::ops::RangeInclusive<u64> = 1 << 16..=1 << 30;
-/// Most files.
+/// Largest number of files.
 const MOST_FILES: u32 = 10_000;
-/// Most incomplete cycles that are no fault.
+/// Largest number of incomplete cycles.
 const MOST_CYCLES: u32 = 1_000_000;
 
 /// The record of the last seconds before a fault.
@@ -27,7 +27,7 @@ pub struct DebugRing {
     pub bytes: u64,
     /// Where files are written.
     pub directory: PathBuf,
-    /// Most files of a master; the oldest ones are removed.
+    /// Largest number of files of a master; those of lost owners are removed first, then the oldest ones.
     pub files: u32,
     /// Incomplete cycles of a domain in a row that are a fault.
     pub cycles: u32,

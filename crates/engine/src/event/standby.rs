@@ -52,8 +52,8 @@ pub enum StandbyEvent {
         /// What differs.
         what: String,
     },
-    /// One of both MainDevices has master frames of a version that the other one cannot read: none can take over for
-    /// the other. Reported on both sides.
+    /// One of both MainDevices has master frames of a version that the other one cannot read: neither can take over
+    /// from the other. Reported on both sides.
     OtherVersion {
         /// Version of the other MainDevice.
         got: u8,

@@ -103,7 +103,7 @@ pub struct Readout {
     pub station: StationAddress,
     /// Register STATION_ALIAS (0x0012); 0 is none.
     pub alias: u16,
-    /// Whether this or the SII has the alias.
+    /// Whether the alias is that of this register or of the SII.
     pub alias_source: AliasSource,
     /// Registers 0x0000..0x0009.
     pub information: Information,

@@ -75,7 +75,7 @@ const FORCED: u8 = 0x80;
 const HOLDS: u8 = 0x40;
 /// Bits that are no role.
 const MODIFIERS: u8 = 0xC0;
-/// Bit of the reasons of the application, of no reason: [`RoleControl::hold`] was called.
+/// A bit beside the reasons of the application: [`RoleControl::hold`] was called.
 #[cfg(feature = "standby")]
 const HOLD_DECIDED: u16 = 0x8000;
 /// The bits that are reasons.
@@ -227,7 +227,7 @@ impl RoleControl {
         self.words.request.store(RoleRequest::Inactive.code() | HOLDS | forced, Ordering::Release);
     }
 
-    /// Permanent standby as a policy says, before an application begins; no change if it was decided with
+    /// Permanent standby as a policy requires, before an application begins; no change if it was decided with
     /// [`RoleControl::hold`] or [`RoleControl::request_hold`] before.
     #[cfg(feature = "standby")]
     pub fn begin_held(&self, held: bool) {

@@ -27,7 +27,7 @@ pub fn remove(address: usize) {
 }
 
 /// The handles of all masters that are open. None while another thread opens or releases one: the end of a process
-/// waits for nothing.
+/// does not wait.
 pub fn addresses() -> Vec<usize> {
     let opened = OPENED.of(Mutex::default).try_lock();
     opened.map(|opened| opened.iter().map(|opened| opened.address()).collect()).unwrap_or_default()

@@ -120,7 +120,7 @@ long syscall(long number, ...)
     return next(number, arguments[0], arguments[1], arguments[2], arguments[3], arguments[4], arguments[5]);
 }
 
-/* That what is to be counted is counted. */
+/* Checks that the counters count. */
 static int counting_works(void)
 {
     static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;

@@ -1,6 +1,6 @@
 /*
- * Declares one SubDevice and says whether it gets to OP: switches ALIAS POSITION VENDOR PRODUCT. A vendor or a product
- * "own" is that of the SubDevice at position 1.
+ * Declares one SubDevice and prints whether it reaches OP: switches ALIAS POSITION VENDOR PRODUCT. A vendor or a
+ * product "own" is that of the SubDevice at position 1.
  */
 #include <stdio.h>
 #include <stdlib.h>

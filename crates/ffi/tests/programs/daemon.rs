@@ -185,7 +185,7 @@ impl Bench {
         stalls.iter().any(|(end, stood)| *stood >= length && (first..before_ns).contains(end))
     }
 
-    /// Asks the daemon, as a tool does.
+    /// Sends a query to the daemon, as a tool does.
     pub fn ask(&self, what: Query) {
         let mut client = Client::connect(&self.socket, "test").expect("it is there");
         client.ask_patiently(0, &what, &[]).expect("it is answered");

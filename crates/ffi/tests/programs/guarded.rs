@@ -4,9 +4,9 @@ use std::path::Path;
 
 use crate::library::{here, outputs, program};
 
-/// What a guarded function ends with.
+/// The call with which a guarded function ends.
 const GUARDS: [&str; 4] = ["call(", "call_for(", "ask(", "caught("];
-/// Functions that end in a guard themselves, to which functions of C pass on what they got.
+/// Functions that end in a guard themselves, to which functions of C pass their arguments.
 const PASSING: [&str; 5] = ["add_sdo(", "create(", "load(", "named(", "register("];
 
 /// The functions of a file whose head begins with one of these words: head and body, as rustfmt lays them out.
@@ -21,7 +21,7 @@ fn functions<'a>(text: &'a str, heads: &'a [&str]) -> Vec<(&'a str, &'a str)> {
     heads.map(body).collect()
 }
 
-/// Whether nothing but closures and one guarded call is in a body: what runs, runs in the guard.
+/// Whether a body has only closures and one guarded call, so that all of its code runs in the guard.
 fn is_guarded(body: &str) -> bool {
     let mut lines = body.lines().filter(|line| !line.trim().starts_with("//")).peekable();
     while let Some(line) = lines.next() {

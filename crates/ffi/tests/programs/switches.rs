@@ -21,7 +21,7 @@ fn segment(test: &str) -> PathBuf {
     path
 }
 
-/// What the program says of a SubDevice at a place and with an identity; what it reports if it fails.
+/// The output of the program for a SubDevice with this place and identity; its error if it fails.
 fn said(command: &mut Command, place: [&str; 4]) -> Result<String, String> {
     let Output { status, stdout, stderr } = command.args(place).output().expect("it runs");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
@@ -61,7 +61,7 @@ fn a_program_has_the_settings_of_its_daemon() {
     settings.has_wildcards = true;
     let wild = Bench::start_with(&segment, "wild", settings);
     assert_eq!(run(&wild, &switches, ["7", "0", ANY, "own"]).as_deref(), Ok(FOUND));
-    // The variables of the program do not count beside a daemon.
+    // With a daemon the variables of the program have no effect.
     let mut command = plain.command(&switches);
     assert_eq!(said(command.env("RINGCAT_WILDCARDS", "yes"), ["7", "0", ANY, "own"]).as_deref(), Ok(MISSING));
 }
@@ -100,7 +100,7 @@ fn without_rt_syslog_no_line_is_about_a_working_counter() {
         child.kill().expect("it runs");
         let output = child.wait_with_output().expect("it has ended");
         let text = String::from_utf8_lossy(&output.stderr);
-        // The SubDevice that is gone is seen without a cyclic line, too.
+        // The absence of the SubDevice is reported without a cyclic line, too.
         assert!(text.contains("responding: 1."), "{text}");
         assert_eq!(text.contains("orking counter"), prints_cyclic_lines, "{text}");
     }

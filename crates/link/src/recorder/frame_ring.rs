@@ -170,13 +170,13 @@ mod tests {
 
     // covers: capture
     #[test]
-    fn a_ring_for_more_bytes_than_there_are_is_refused() {
+    fn a_ring_larger_than_the_memory_is_refused() {
         assert!(FrameRing::new(usize::MAX, Duration::from_secs(1)).is_err());
     }
 
     // covers: capture
     #[test]
-    fn notes_come_back_as_they_were() {
+    fn notes_are_read_as_they_were_written() {
         let note = FrameNote { interface: 1, direction: Direction::In, time_ns: u64::MAX - 5, length: 70_000 };
         let kept = Kept { note, captured: 1_514 };
         let again = Kept::take(&mut kept.to_bytes().into_iter()).expect("it is whole");

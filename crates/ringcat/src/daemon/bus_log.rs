@@ -41,7 +41,7 @@ pub struct Followed {
     supervisor: SupervisorThread,
     ownership: Option<OwnershipWatch>,
     lines: Arc<Mutex<Lines>>,
-    /// Also what cyclic frames show.
+    /// Also print lines about the results of cyclic frames.
     with_cyclic: bool,
     record: Option<Arc<Mutex<FrameRecord>>>,
 }
@@ -59,8 +59,8 @@ impl Followed {
         self
     }
 
-    /// Whether there are lines about what cyclic frames show: working counters, and datagrams that were lost, unmatched
-    /// or skipped. There are by default.
+    /// Whether there are lines about the results of cyclic frames: working counters, and datagrams that were lost,
+    /// unmatched or skipped. There are by default.
     #[must_use]
     pub fn with_cyclic_lines(mut self, with_cyclic: bool) -> Followed {
         self.with_cyclic = with_cyclic;

@@ -116,14 +116,15 @@ impl FrameRecord {
         Ok(FrameRecord { reader, ring, spare, settings, master, names, domains, due, last_written, writing })
     }
 
-    /// Goes on behind a file of another record of this master.
+    /// Takes into account when another record of this master has written its last file.
     #[must_use]
     pub fn with_last_written(mut self, last_written: LastWritten) -> FrameRecord {
         self.last_written = last_written;
         self
     }
 
-    /// Takes the frames that have waited for a while: those of all threads are in the order of their times then.
+    /// Takes the frames that were in their queues at the call before, so that the frames of all threads are in the
+    /// order of their times.
     pub(super) fn take_frames(&mut self) {
         let ring = &mut self.ring;
         let taken: Result<(), Infallible> = self.reader.read(|note, frame| {
@@ -147,7 +148,7 @@ impl FrameRecord {
         }
     }
 
-    /// A file is written soon, unless one was written a moment ago.
+    /// A file is written after a short time, unless one was written within the last 10 s.
     pub fn note(&mut self, reason: RecordReason, now: Instant) {
         let is_soon = self.last_written.at().is_some_and(|at| now.duration_since(at) < PAUSE);
         if self.due.is_none() && !is_soon {
@@ -210,14 +211,14 @@ impl FrameRecord {
 
     /// Waits for the thread that writes.
     fn wait(&mut self) -> Option<Line> {
-        // The panic handler has reported a panic of the thread; its ring is gone.
+        // The panic handler has reported a panic of the thread; its ring is lost.
         let (line, mut ring) = self.writing.take()?.join().ok()?;
         ring.clear();
         self.spare = Some(ring);
         Some(line)
     }
 
-    /// Writes in a thread of its own; the line that there is none.
+    /// Writes in a thread of its own. Returns a line if that cannot begin.
     fn write(&mut self, reason: RecordReason, now: Instant) -> Option<Line> {
         self.last_written.set(now);
         self.take_all_frames();
@@ -359,7 +360,7 @@ mod tests {
 
     // covers: daemon, capture
     #[test]
-    fn files_are_at_most_so_many_and_not_one_after_the_other() {
+    fn there_is_a_largest_number_of_files_and_a_pause_between_them() {
         let place = Place::new("room");
         std::fs::write(place.0.join("ringcat-01-other.pcapng"), []).expect("it can be written");
         let (taps, taps_of_next) = (Taps::new(1), Taps::new(1));

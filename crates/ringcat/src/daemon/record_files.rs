@@ -15,7 +15,7 @@ const DIGITS: usize = 13;
 const COMPLETE: &str = ".pcapng";
 /// Name of a file that is being written.
 const PARTIAL: &str = ".pcapng.part";
-/// No process writes a file for so long: it has ended before.
+/// Writing a file takes less time than this: the process that wrote an older partial file has ended.
 const ABANDONED: Duration = Duration::from_secs(600);
 
 /// Why a file is written.
@@ -68,7 +68,7 @@ pub(super) struct RecordFiles<'a> {
     pub most: u32,
 }
 
-/// What the name of a file says.
+/// Time and reason in the name of a file.
 type Named = (u64, RecordReason);
 
 impl RecordFiles<'_> {
@@ -115,7 +115,7 @@ impl RecordFiles<'_> {
         }
     }
 
-    /// What the name of a file of this master says.
+    /// Time and reason in the name of a file of this master.
     fn parse(&self, name: &str, end: &str) -> Option<Named> {
         let begin = format!("ringcat-{}-", self.master);
         let (at, word) = name.strip_prefix(&begin)?.strip_suffix(end)?.split_once('-')?;

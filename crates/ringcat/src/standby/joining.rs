@@ -48,8 +48,8 @@ pub struct Joining {
 }
 
 impl Joining {
-    /// Begins to listen. The policy decides whether it is in permanent standby, unless [`RoleControl::hold`] has done
-    /// so before; from then on that does.
+    /// Begins to listen. The policy decides whether it is in permanent standby, unless [`RoleControl::hold`] was called
+    /// before; later calls change it.
     pub fn begin<L: Links>(main_device: &MainDevice<L>, policy: &Policy) -> Joining {
         let control = main_device.role_control();
         control.begin_held(!policy.takes_over);

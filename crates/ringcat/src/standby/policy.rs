@@ -47,8 +47,8 @@ pub enum OnCollision {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Policy {
-    /// Whether it takes over without being asked to. Otherwise it stays INACTIVE until a role is requested (permanent
-    /// standby), and is not handed the role over. [`RoleControl::hold`](super::RoleControl::hold) changes that later,
+    /// Whether it takes over without a request. Otherwise it stays INACTIVE until the role is requested (permanent
+    /// standby), and does not accept a hand-over. [`RoleControl::hold`](super::RoleControl::hold) changes that later,
     /// from any thread.
     pub takes_over: bool,
     /// Cycles without process data of the ACTIVE after which it takes over. At least 3.

@@ -94,7 +94,7 @@ impl Controller {
 
 // covers: AC-08, REQ037, REQ015, standby, threads
 #[test]
-fn both_controllers_are_asked_and_switched_over_tcp() {
+fn both_controllers_report_their_state_and_switch_roles_over_tcp() {
     let [first, second] = SharedSegment::halves_of_two(ring_of_two(&KINDS));
     let plant = first.0.plant();
     let switch = |host: Host, up: bool| {
@@ -213,7 +213,7 @@ fn bytes_of_any_kind_cost_a_bounded_time_and_end_the_connection() {
         let _ = stream.write_all(&bytes);
         assert!(is_ended(&mut stream, LIMIT), "{:02x?}", &bytes[..bytes.len().min(16)]);
     }
-    // One that asks a lot at once gets one answer in each cycle of the server, and others get theirs.
+    // A client with many queries at once gets one answer in each cycle of the server, and others get theirs.
     let mut greedy = TcpStream::connect(server.address()).expect("it listens");
     let message = |query: RemoteQuery| encode(&query).expect("it is short");
     let hello = message(RemoteQuery::Hello { token: "a-token-of-the-test".to_owned() });

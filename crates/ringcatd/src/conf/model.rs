@@ -37,7 +37,7 @@ pub struct Own {
     pub debug_level: Option<u32>,
     /// Whether a master waits until its backup interface is there.
     pub needs_backup: bool,
-    /// What holds for whatever drives a master.
+    /// Settings of the masters, for the daemon and for applications.
     pub bus: BusSettings,
     /// States of SubDevices after the end of an application.
     pub safe_states: Vec<SafeState>,

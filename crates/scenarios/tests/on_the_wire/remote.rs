@@ -1,4 +1,4 @@
-//! Two controllers that hand their role over on a schedule, and that are asked and switched over TCP.
+//! Two controllers that hand their role over on a schedule; their state is read and their roles are switched over TCP.
 
 use std::fs;
 use std::os::unix::fs::OpenOptionsExt;
@@ -37,7 +37,7 @@ const SERVER: &str = "127.0.0.1:7300";
 
 // covers: standby, json, AC-08, REQ037, REQ015, MR-07
 #[test]
-fn controllers_switch_on_schedule_and_are_asked_and_switched_over_tcp() {
+fn controllers_switch_roles_on_schedule_and_over_tcp() {
     let Some(pair) = Pair::new() else { return };
     let token = Token::new();
     pair.bench.ip_main("link set lo up");

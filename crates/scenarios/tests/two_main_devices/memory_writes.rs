@@ -145,7 +145,7 @@ fn an_inactive_without_an_application_leaves_the_role_to_one_that_writes() {
     let file = MemoryWrite::new(WriteKind::File, false, DRIVE.0);
     assert_eq!((two.active(), refused(&two, 1)), (Some(0), vec![file]), "{}", two.log());
     assert!(written.is_running() && two.left_op.is_empty());
-    // After the failure of the one that writes nothing is refused.
+    // After the failure of the MainDevice that writes, nothing is refused.
     two.kill(0);
     two.run(4 * CYCLE);
     two.controllers[1].request(RoleRequest::Active);

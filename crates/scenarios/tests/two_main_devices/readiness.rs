@@ -60,7 +60,7 @@ fn both_report_that_they_are_ready_and_each_reason_why_not() {
         }
     }
 
-    // Its own guard is a reason at the ACTIVE alone; that it is held is none.
+    // Its own guard is a reason at the ACTIVE only; its permanent standby is no reason.
     two.controllers[0].control().set_not_ready(NotReady::GUARD.0 | NotReady::HELD.0, true);
     settle(&mut two);
     assert_eq!(known(&two), [NotReady::GUARD, NotReady::NOTHING]);

@@ -47,7 +47,7 @@ impl Stage {
     }
 }
 
-/// Why a takeover would cost more than its time-out, as bits: what one of two MainDevices knows.
+/// Why a takeover would cost more than its time-out, as bits, as one of two MainDevices has determined it.
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
 pub struct NotReady(pub u16);
 

@@ -58,7 +58,7 @@ pub struct Lines {
 /// A line with its priority.
 pub(super) type Line = (Priority, String);
 
-/// Whether an event is what cyclic frames show.
+/// Whether an event is about the result of cyclic frames.
 pub(super) const fn is_cyclic(event: &Event) -> bool {
     matches!(event, Event::Domain { .. } | Event::Skipped { .. })
 }
@@ -90,7 +90,7 @@ impl Lines {
         }
     }
 
-    /// Takes whether this process has the bus still, and why not. Whether that is new.
+    /// Stores whether this process still has the bus, and why not. Returns whether that has changed.
     pub(super) fn own(&mut self, now: Ownership, cause: &str) -> bool {
         if self.ownership.replace(now) == Some(now) {
             return false;

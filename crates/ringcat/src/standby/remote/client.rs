@@ -56,12 +56,12 @@ pub struct RemoteClient {
     stream: TcpStream,
     arrived: Vec<u8>,
     program: String,
-    /// Longest time of an answer.
+    /// Longest time until an answer is complete.
     limit: Duration,
 }
 
 impl RemoteClient {
-    /// Connects, and shows the token. `limit`: longest time of the connection and of each answer.
+    /// Connects, and sends the token. `limit`: longest time of the connection and of each answer.
     ///
     /// # Errors
     /// [`RemoteError`].
@@ -90,7 +90,7 @@ impl RemoteClient {
         &self.program
     }
 
-    /// What the MainDevice is and knows.
+    /// State of the MainDevice.
     ///
     /// # Errors
     /// [`RemoteError`].
@@ -138,7 +138,7 @@ impl RemoteClient {
                     answer => Ok(answer),
                 };
             }
-            // Of the whole answer, in however many parts it comes.
+            // The limit is for the whole answer, however many parts it has.
             let left = end.saturating_duration_since(Instant::now());
             if left.is_zero() {
                 return Err(io::Error::from(io::ErrorKind::TimedOut).into());
@@ -158,5 +158,5 @@ fn unexpected(answer: &RemoteAnswer) -> RemoteError {
         RemoteAnswer::State(_) => "a state",
         _ => "another answer",
     };
-    RemoteError::Message(format!("{kind} that was not asked for"))
+    RemoteError::Message(format!("{kind} that was not requested"))
 }

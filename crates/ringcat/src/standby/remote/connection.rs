@@ -1,4 +1,4 @@
-//! One client of remote access: what has arrived of it, what it still has to take, and until when.
+//! One client of remote access: bytes that have arrived, bytes that are still to be sent, and the time limit.
 
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
@@ -8,9 +8,9 @@ use ringcat_control::remote::{LONGEST_QUERY, RemoteAnswer, RemoteQuery, decode, 
 
 use super::token::RemoteToken;
 
-/// A client that has not shown its token within this time is disconnected.
+/// A client that has not sent the token within this time is disconnected.
 const HELLO: Duration = Duration::from_secs(2);
-/// So is one that does not take an answer within this time.
+/// A client that does not receive an answer within this time is disconnected.
 const TAKES: Duration = Duration::from_secs(5);
 /// Bytes of a query that are kept at most: its header and content.
 const MOST: usize = LONGEST_QUERY + 64;
@@ -18,11 +18,11 @@ const MOST: usize = LONGEST_QUERY + 64;
 /// What the client may do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
-    /// It has not shown its token.
+    /// It has not sent the token.
     Unknown,
-    /// It may ask.
+    /// Its queries are answered.
     Admitted,
-    /// It gets its last answer, and no more.
+    /// It gets its last answer, and is then disconnected.
     Ends,
 }
 
@@ -33,7 +33,7 @@ pub(super) struct Connection {
     stage: Stage,
     arrived: Vec<u8>,
     leaving: Vec<u8>,
-    /// It is disconnected then, unless something has happened before.
+    /// The time at which it is disconnected; later after each message.
     limit: Instant,
     silence: Duration,
 }
@@ -47,7 +47,7 @@ impl Connection {
         Ok(Connection { stream, stage: Stage::Unknown, arrived, leaving, limit: now + HELLO, silence })
     }
 
-    /// Whether it has shown its token.
+    /// Whether it has sent the token.
     pub fn is_admitted(&self) -> bool {
         self.stage == Stage::Admitted
     }

@@ -1,7 +1,7 @@
 //! The thread that answers clients of remote access.
 //!
-//! It works once in each of its cycles, on each connection for one query at most: what clients do costs a bounded time,
-//! and no memory that grows.
+//! It works once in each of its cycles, on each connection for one query at most: the time for clients is bounded, and
+//! so is their memory.
 
 use std::io;
 use std::net::{SocketAddr, TcpListener};
@@ -34,10 +34,10 @@ const LONGEST: Duration = Duration::from_secs(1);
 pub struct RemoteOptions {
     /// Period at which clients are answered, 10 ms by default, 1 ms to 1 s: the delay of an answer, and the load.
     pub cycle: Duration,
-    /// Most clients at a time, 8 by default. A further one takes the place of the oldest that has not shown its token;
-    /// if all have, it is disconnected.
+    /// Largest number of clients, 8 by default. A further one replaces the oldest one that has not sent the token; if
+    /// all have sent it, the further one is disconnected.
     pub clients: usize,
-    /// A client that asks nothing for this time is disconnected, 60 s by default.
+    /// A client that sends no query for this time is disconnected, 60 s by default.
     pub silence: Duration,
 }
 
@@ -182,7 +182,7 @@ impl Served {
             }
             RemoteQuery::Hold { held, force } => {
                 match held {
-                    // A write that keeps the role keeps it from being held, too.
+                    // If a write keeps the role, permanent standby does not begin either.
                     true => self.control.request_hold(*force),
                     false => self.control.hold(false),
                 }

@@ -1,4 +1,4 @@
-//! What shows that a client may ask: the bytes of a file that only its owner can read.
+//! The token of a client: the bytes of a file that only its owner can read.
 
 use std::error::Error;
 use std::fmt;
@@ -30,7 +30,7 @@ pub enum TokenError {
         /// Its mode.
         mode: u32,
     },
-    /// The file belongs to another user than the one of this process or root.
+    /// The file belongs neither to the user of this process nor to root.
     Owner {
         /// Number of that user.
         user: u32,
