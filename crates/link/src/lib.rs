@@ -14,7 +14,7 @@
 //! * [`monotonic`], [`realtime`]: the host's clock, scheduling, memory locking, processor latency;
 //! * [`operator`]: lines on the standard error and in the journal, without waiting;
 //! * [`terminal`]: its size, and keys one by one; [`job`]: signals that stop and continue a program in it;
-//! * [`print`]: lines whose reader may leave;
+//! * [`mod@print`]: lines whose reader may leave;
 //! * [`visible`]: text for a terminal, with hidden characters as escape sequences;
 //! * [`signals`]: signals that request the end of a program;
 //! * [`pcapng`]: captures for Wireshark; [`recorder`]: writing captures during operation; [`sniffer`]: capturing an
