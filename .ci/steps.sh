@@ -255,9 +255,9 @@ demo() {
     local too_large=0
     cargo run --release
     cargo run --release -- demo --standby
-    small ringcat 11050000 || too_large=1
-    small ringcatd 7100000 || too_large=1
-    small ethercat 1850000 || too_large=1
+    small ringcat 11260000 || too_large=1
+    small ringcatd 7150000 || too_large=1
+    small ethercat 1870000 || too_large=1
     return "$too_large"
 }
 
