@@ -79,8 +79,7 @@ const GUIDE: &str = "docs/guide/";
 const EXAMPLES: usize = 20;
 
 /// Up to which commit the language is reviewed; what is newer is `git log COMMIT..`.
-const REVIEWED: &str =
-    "up to 32bbe938, 2026-11-30: pages, comments, names of tests; messages up to a8626268";
+const REVIEWED: &str = "up to 32bbe938, 2026-11-30: pages, comments, names of tests; messages up to a8626268";
 
 /// Bars that are measured by running something: what, the bar, the command.
 pub const ELSEWHERE: [(&str, &str, &str); 8] = [
