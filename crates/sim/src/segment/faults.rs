@@ -77,3 +77,6 @@ impl Plan<'_> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests;
