@@ -9,7 +9,6 @@ use crate::config::{PdoAssignment, PdoMapping, SdoDownload};
 use crate::mail::coe::{self, SdoAddress, SdoError, pdo};
 use crate::mail::{Limits, Mailbox};
 use crate::plan::{HeldPdos, PdoPlan};
-use crate::procedures::dictionary::is_missing_object;
 
 /// What is known of the dictionary of a SubDevice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,7 +74,7 @@ fn held_now(plan: &PdoPlan, before: Option<HeldPdos>, sdos: &[SdoDownload]) -> P
 async fn read(mailbox: &Mailbox, plan: &PdoPlan, limits: Limits) -> Result<Option<HeldPdos>, SdoError> {
     let pdos = match pdo::read_assignment(mailbox, plan.wanted.sync_manager, limits).await {
         Ok(pdos) => pdos,
-        Err(error) if is_missing_object(&error) => return Ok(None),
+        Err(error) if error.is_missing_object() => return Ok(None),
         Err(error) => return Err(error),
     };
     let assigned = pdos.iter().map(|pdo| pdo.index).collect();
@@ -87,7 +86,7 @@ async fn read(mailbox: &Mailbox, plan: &PdoPlan, limits: Limits) -> Result<Optio
         match pdo::read_mapping(mailbox, wanted.index, limits).await {
             Ok(entries) => held.mapped.push(PdoMapping::of(wanted.index, entries)),
             // To be written, if the SubDevice permits it.
-            Err(error) if is_missing_object(&error) => {}
+            Err(error) if error.is_missing_object() => {}
             Err(error) => return Err(error),
         }
     }

@@ -6,15 +6,15 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use ringcat_wire::al::AlState;
-use ringcat_wire::mailbox::sdo::AbortCode;
 
 use super::scan::Scan;
 use super::visit::visit;
 use crate::config::PdoAssignment;
 use crate::event::Notice;
 use crate::info::{SiiAssignment, SubDeviceInfo};
-use crate::mail::coe::{SdoError, SdoFailure, pdo};
-use crate::mail::{Limits, Mailbox, MailboxError};
+use crate::mail::coe::SdoError;
+use crate::mail::coe::pdo::Lists;
+use crate::mail::{Limits, Mailbox};
 use crate::segment::ReadPdos;
 use crate::supervisor::Bus;
 
@@ -41,7 +41,7 @@ pub(super) async fn read(bus: &Bus, info: &SubDeviceInfo, mailbox: &Mailbox) -> 
     let read = bus.within(LIMIT, assignments(info, mailbox)).await;
     match read {
         Ok(Ok(dictionary)) => dictionary,
-        Ok(Err(error)) if is_interrupted(&error) => Dictionary::Interrupted,
+        Ok(Err(error)) if error.is_interrupted() => Dictionary::Interrupted,
         Ok(Err(error)) => Dictionary::Unreadable(error.to_string()),
         Err(_) => Dictionary::Unreadable("it takes too long".to_string()),
     }
@@ -49,10 +49,11 @@ pub(super) async fn read(bus: &Bus, info: &SubDeviceInfo, mailbox: &Mailbox) -> 
 
 async fn assignments(info: &SubDeviceInfo, mailbox: &Mailbox) -> Result<Dictionary, SdoError> {
     let (mut held, mut missing) = (Vec::new(), Vec::new());
+    let mut lists = Lists::new(mailbox, LIMITS).with_complete_access(info.coe.complete_access());
     for (sync_manager, direction) in info.process_data() {
-        match pdo::read_assignment(mailbox, sync_manager, LIMITS).await {
+        match lists.assignment(sync_manager).await {
             Ok(pdos) => held.push(PdoAssignment::new(sync_manager, direction, pdos)),
-            Err(error) if is_missing_object(&error) => missing.push(error),
+            Err(error) if error.is_missing_object() => missing.push(error),
             Err(error) => return Err(error),
         }
     }
@@ -61,15 +62,6 @@ async fn assignments(info: &SubDeviceInfo, mailbox: &Mailbox) -> Result<Dictiona
         Some(_) if held.is_empty() => Ok(Dictionary::None),
         Some(error) => Err(error),
     }
-}
-
-/// Whether a SubDevice has no such object.
-pub(super) fn is_missing_object(error: &SdoError) -> bool {
-    error.cause == SdoFailure::Aborted(AbortCode::OBJECT_DOES_NOT_EXIST)
-}
-
-fn is_interrupted(error: &SdoError) -> bool {
-    matches!(error.cause, SdoFailure::Mailbox(MailboxError::Bus(_) | MailboxError::Closed))
 }
 
 /// Says why a dictionary cannot be read.

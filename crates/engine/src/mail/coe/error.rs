@@ -50,6 +50,18 @@ pub enum SdoFailure {
     },
 }
 
+impl SdoError {
+    /// Whether the SubDevice has no such object.
+    pub(crate) fn is_missing_object(&self) -> bool {
+        self.cause == SdoFailure::Aborted(AbortCode::OBJECT_DOES_NOT_EXIST)
+    }
+
+    /// Whether frames were lost, or the mailbox was closed.
+    pub(crate) fn is_interrupted(&self) -> bool {
+        matches!(self.cause, SdoFailure::Mailbox(MailboxError::Bus(_) | MailboxError::Closed))
+    }
+}
+
 impl fmt::Display for SdoError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "SDO {}: {}", self.object, self.cause)

@@ -18,7 +18,8 @@ use crate::config::{PdoEntry, PdoMapping};
 use crate::declared::{Address, SubDeviceId};
 use crate::link::LinkSet;
 use crate::mail::aoe::{AoeError, AoeRoute, AoeStates};
-use crate::mail::coe::{SdoAddress, SdoFailure, information, pdo, read, write};
+use crate::mail::coe::pdo::{self, Lists};
+use crate::mail::coe::{SdoAddress, SdoFailure, information, read, write};
 use crate::mail::foe::{FoeFailure, FoeOptions, FoeProgress};
 use crate::mail::soe::{SoeAddress, SoeFailure};
 use crate::mail::stream::{Bounded, Bytes};
@@ -135,6 +136,31 @@ fn assignment_and_mapping_are_written_and_read_back() {
     });
     assert_eq!(result, Ok(pdos));
     assert_eq!(bench.device.server.objects[&(0x1600, 3)], [32, 2, 0x7A, 0x60]);
+}
+
+// covers: 6.3, sdo-information
+#[test]
+fn lists_are_read_whole_or_by_entries_if_the_answer_is_no_list() {
+    let entries = [PdoEntry::new(0x6040, 0, 16), PdoEntry::new(0, 0, 8), PdoEntry::new(0x607A, 2, 32)];
+    let pdos = vec![PdoMapping::of(0x1600, entries), PdoMapping::of(0x1601, [])];
+    // Whether complete access works, and the uploads: without it one is in vain.
+    for (complete_access, uploads) in [(true, 3), (false, 1 + 3 + 4 + 1)] {
+        let mut bench = Bench::new(LinkSet::Single, 128);
+        bench.device.server.complete_access = complete_access;
+        let (mailbox, written) = (bench.mailbox.clone(), pdos.clone());
+        let result = bench.run(async move {
+            pdo::write_assignment(&mailbox, 2, &written, LIMITS).await.unwrap();
+            Lists::new(&mailbox, LIMITS).with_complete_access(true).assignment(2).await
+        });
+        assert_eq!(result, Ok(pdos.clone()), "{complete_access}");
+        assert_eq!(bench.device.server.uploads, uploads, "{complete_access}");
+    }
+    // What is missing is reported as such.
+    let mut bench = Bench::new(LinkSet::Single, 128);
+    let mailbox = bench.mailbox.clone();
+    let error = bench
+        .run(async move { Lists::new(&mailbox, LIMITS).with_complete_access(true).assignment(3).await.unwrap_err() });
+    assert!(error.is_missing_object() && bench.device.server.uploads == 1, "{error}");
 }
 
 // covers: 6.3, sdo-information

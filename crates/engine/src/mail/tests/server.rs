@@ -31,6 +31,10 @@ pub struct AllProtocols {
     pub foe_errors: Vec<(u32, String)>,
     /// The next messages of FoE are answered with BUSY.
     pub busy: u32,
+    /// Whole objects are read with complete access; without, it is ignored.
+    pub complete_access: bool,
+    /// Objects and entries that were read.
+    pub uploads: u32,
     /// The toggle bit of the next segment is wrong.
     pub wrong_toggle: bool,
     sdo: Option<Sdo>,
@@ -79,9 +83,14 @@ impl AllProtocols {
 
     fn upload(&mut self, index: u16, sub_index: u8, complete_access: bool) -> Vec<(Protocol, Vec<u8>)> {
         let mut out = vec![0; self.capacity];
-        let Some(data) = self.objects.get(&(index, sub_index)).cloned() else {
+        self.uploads += 1;
+        let Some(mut data) = self.objects.get(&(index, sub_index)).cloned() else {
             return abort(index, sub_index, AbortCode::OBJECT_DOES_NOT_EXIST);
         };
+        if complete_access && self.complete_access {
+            data.push(0);
+            data.extend(self.objects.range((index, 1)..=(index, 255)).flat_map(|(_, entry)| entry));
+        }
         if (1..=4).contains(&data.len()) {
             let response = SdoResponse::UploadExpedited { index, sub_index, complete_access, data: &data };
             return encoded(&response, &mut out);

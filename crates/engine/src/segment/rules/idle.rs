@@ -68,7 +68,10 @@ impl Segment {
                 self.words.begin_idle();
             }
             IdleObservation::Unanswered(words) => self.observe_silence_of_all(&words, now, effects),
-            IdleObservation::Scanned => self.idle.end(Work::FirstScan),
+            IdleObservation::Scanned => {
+                self.idle.end(Work::FirstScan);
+                self.keep_scanned(now);
+            }
             IdleObservation::RescanAsked => self.idle.rescans.asked += 1,
             IdleObservation::Followed { versions, found, wanted } => {
                 self.idle.read(false);
@@ -128,10 +131,7 @@ impl Segment {
             }
             return;
         };
-        // SubDevices of the last scan are kept in their states from now on.
-        if self.has_untouched() {
-            self.take_over(now);
-        }
+        self.keep_scanned(now);
         if self.idle.compared == Comparison::Open {
             self.idle.compared = Comparison::Same(scanned);
         }
@@ -162,6 +162,13 @@ impl Segment {
             let counts = shown.counts();
             effects.report(Event::Counted { main: counts.main, redundant: counts.redundant });
             self.idle.changes = self.idle.changes.wrapping_add(1);
+        }
+    }
+
+    /// SubDevices of the last scan are kept in their states from now on.
+    fn keep_scanned(&mut self, now: Instant) {
+        if !self.is_scanning() && self.has_untouched() {
+            self.take_over(now);
         }
     }
 
@@ -199,9 +206,7 @@ impl Segment {
         self.idle.compared = Comparison::Same(counts);
         self.words.scan.begin(Some(counts));
         self.idle.readdressed.clear();
-        if self.has_untouched() {
-            self.take_over(now);
-        }
+        self.keep_scanned(now);
         if added + removed > 0 {
             effects.report(Event::SegmentChanged { subdevices, added, removed });
         }

@@ -93,6 +93,23 @@ fn idle_operation_starts_its_watches_once_and_an_application_its_own() {
 }
 
 #[test]
+fn subdevices_are_brought_to_preop_when_the_first_scan_has_ended_without_a_broadcast() {
+    for has_begun_again in [false, true] {
+        let mut idle = Idle::unscanned();
+        idle.broadcast(3, 1);
+        idle.observe(Observation::ScanEnded(Ok(found(&[1, 2, 3]))));
+        if has_begun_again {
+            // The application has requested another scan meanwhile.
+            idle.observe(Observation::ScanBegun);
+        }
+        idle.seen(IdleObservation::Scanned);
+        let begun = idle.observe(Observation::Undeclared(UndeclaredObservation::AttemptsDue));
+        let attempts = begun.iter().filter(|it| matches!(it, Effect::Start(Task::BringUndeclared { .. }))).count();
+        assert_eq!(attempts, if has_begun_again { 0 } else { 3 }, "{begun:?}");
+    }
+}
+
+#[test]
 fn another_count_is_reported_once_and_followed_until_that_succeeds() {
     let mut idle = Idle::kept();
     let counted = Effect::Report(Event::Counted { main: 2, redundant: 0 });
