@@ -2,7 +2,7 @@
 //!
 //! Pointers of C are checked here and nowhere else. A handle that is NULL, or was ended by deactivation or release, is
 //! found out by its mark. Functions end in a call of the safe modules, which `guard` protects from panics
-//! (`tests/programs/guarded.rs` checks each of them).
+//! (`tests/programs/guarded.rs` checks each of them). Functions that may wait are called by `waiting`.
 
 mod again;
 mod cyclic;
@@ -20,3 +20,4 @@ mod slave_config;
 mod slave_state;
 mod soe_voe;
 mod transfers;
+mod waiting;

@@ -67,10 +67,7 @@ impl FramePipe {
 
     /// Sends a frame; false if it is lost.
     pub fn send(&mut self, frame: &[u8]) -> bool {
-        let flags = libc::MSG_DONTWAIT | libc::MSG_NOSIGNAL;
-        // SAFETY: pointer and length describe the live frame, which the kernel only reads.
-        let sent = unsafe { libc::send(self.fd.as_raw_fd(), frame.as_ptr().cast(), frame.len(), flags) };
-        sent >= 0
+        kernel::send(self.fd.as_raw_fd(), frame).is_ok()
     }
 
     /// Passes the oldest frame to `take`; false if there is none.
@@ -78,16 +75,15 @@ impl FramePipe {
         if self.is_ended.get() {
             return false;
         }
-        let (start, room) = (self.buffer.as_mut_ptr(), self.buffer.len());
-        // SAFETY: pointer and length describe the live buffer, in which any bytes are valid.
-        let received = unsafe { libc::recv(self.fd.as_raw_fd(), start.cast(), room, libc::MSG_DONTWAIT) };
-        match usize::try_from(received) {
-            Ok(0) => self.is_ended.set(true),
-            Ok(length) => take(&self.buffer[..length]),
-            Err(_) if kernel::errno() == libc::ECONNRESET => self.is_ended.set(true),
+        match kernel::receive(self.fd.as_raw_fd(), &mut self.buffer[..]) {
+            Ok(0) | Err(libc::ECONNRESET) => self.is_ended.set(true),
+            Ok(length) => {
+                take(&self.buffer[..length]);
+                return true;
+            }
             Err(_) => {}
         }
-        received > 0
+        false
     }
 
     /// Whether a read or a wait has found that the other end is closed. Frames that were sent before come first.

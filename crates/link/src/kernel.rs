@@ -7,7 +7,6 @@ use std::io;
 use std::mem::{size_of, zeroed};
 use std::os::fd::{AsRawFd, FromRawFd, OwnedFd, RawFd};
 
-#[cfg(target_pointer_width = "64")]
 use crate::system_call::system_call;
 
 pub const PACKET_ADD_MEMBERSHIP: libc::c_int = 1;
@@ -193,26 +192,27 @@ pub fn index_of(name: &str) -> Option<u32> {
     (index != 0).then_some(index)
 }
 
-// The three calls of a cycle do not use the C library ([`crate::system_call`]). On 32-bit targets the `timespec` of the
-// kernel and of the library may differ, so these use the library.
+// The calls of a cycle do not use the C library ([`crate::system_call`]), where each is a cancellation point. On 32-bit
+// targets the `timespec` of the kernel and of the library may differ, so waits use the library there.
 
 /// Sends a frame.
 #[inline(always)]
 pub fn send(fd: RawFd, frame: &[u8]) -> Result<(), i32> {
-    let (start, length, flags) = (frame.as_ptr(), frame.len(), libc::MSG_DONTWAIT);
-    #[cfg(target_pointer_width = "64")]
-    {
-        let arguments = [fd as usize, start as usize, length, flags as usize, 0, 0];
-        // SAFETY: pointer and length describe the live frame, which the kernel only reads; no address is passed.
-        let sent = unsafe { system_call(libc::SYS_sendto, arguments) };
-        if sent < 0 { Err(-sent as i32) } else { Ok(()) }
-    }
-    #[cfg(not(target_pointer_width = "64"))]
-    {
-        // SAFETY: pointer and length describe the live frame, which the kernel only reads.
-        let sent = unsafe { libc::send(fd, start.cast(), length, flags) };
-        if sent < 0 { Err(errno()) } else { Ok(()) }
-    }
+    let (start, length, flags) = (frame.as_ptr(), frame.len(), libc::MSG_DONTWAIT | libc::MSG_NOSIGNAL);
+    let arguments = [fd as usize, start as usize, length, flags as usize, 0, 0];
+    // SAFETY: pointer and length describe the live frame, which the kernel only reads; no address is passed.
+    let sent = unsafe { system_call(libc::SYS_sendto, arguments) };
+    if sent < 0 { Err(-sent as i32) } else { Ok(()) }
+}
+
+/// Receives a message if there is one; its length, 0 if the other end is closed.
+#[inline(always)]
+pub fn receive(fd: RawFd, buffer: &mut [u8]) -> Result<usize, i32> {
+    let (start, length, flags) = (buffer.as_mut_ptr(), buffer.len(), libc::MSG_DONTWAIT);
+    let arguments = [fd as usize, start as usize, length, flags as usize, 0, 0];
+    // SAFETY: pointer and length describe the live buffer, in which any bytes are valid; no address is asked for.
+    let received = unsafe { system_call(libc::SYS_recvfrom, arguments) };
+    usize::try_from(received).map_err(|_| -received as i32)
 }
 
 /// Why a wait has ended.
@@ -282,14 +282,14 @@ pub fn event_counter() -> Result<OwnedFd, i32> {
 pub fn count(fd: RawFd) {
     let one = 1_u64.to_ne_bytes();
     // SAFETY: the pointer refers to eight live bytes that the kernel only reads.
-    unsafe { libc::write(fd, one.as_ptr().cast(), one.len()) };
+    unsafe { system_call(libc::SYS_write, [fd as usize, one.as_ptr() as usize, one.len(), 0, 0, 0]) };
 }
 
 /// Sets such a counter to zero.
 pub fn clear_counter(fd: RawFd) {
     let mut count = [0_u8; 8];
     // SAFETY: the pointer refers to eight live bytes for which all values are valid.
-    unsafe { libc::read(fd, count.as_mut_ptr().cast(), count.len()) };
+    unsafe { system_call(libc::SYS_read, [fd as usize, count.as_mut_ptr() as usize, count.len(), 0, 0, 0]) };
 }
 
 /// A set of descriptors that is readable while one of them has an event (`epoll`).

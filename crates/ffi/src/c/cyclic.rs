@@ -7,6 +7,7 @@ use ringcat::{DomainStatus, RingState};
 use super::handle::{ask, call};
 use super::memory::{list, put};
 use super::objects::{DomainObject, MasterObject, ec_domain_t, ec_master_t};
+use super::waiting;
 use crate::active::Active;
 use crate::code::{Code, Outcome};
 use crate::master::Master;
@@ -93,7 +94,7 @@ unsafe extern "C" fn ecrt_domain_reg_pdo_entry_list(
         }
     };
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { call(domain, register) }
+    unsafe { waiting::call(domain, register) }
 }
 
 /// # Safety

@@ -5,10 +5,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::ptr::null_mut;
 use std::sync::Arc;
 
-use super::guard::caught;
-use super::handle::{Ending, alive, alive_or_failed, ask, bury, call, ending, give};
+use super::handle::{Ending, alive, alive_or_failed, bury, ending, give};
 use super::objects::{DomainObject, MasterObject, Owner, ec_domain_t, ec_master_t, ec_slave_config_t};
 use super::opened::{self, Opened};
+use super::waiting::{ask, call, caught};
 use crate::code::{Code, Outcome, report};
 use crate::host::at_exit;
 use crate::master::Master;

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use ringcat::Link;
 
-use super::handle::call;
 use super::memory::put;
 use super::objects::{MasterObject, ec_master_t};
+use super::waiting::call;
 use crate::code::{Code, Outcome};
 use crate::information::{entry, master, pdo, scan_progress, slave, sync_manager};
 use crate::types::{MasterInfo, PdoEntryInfo, PdoInfo, ScanProgress, SegmentState, SlaveInfo, SyncInfo};

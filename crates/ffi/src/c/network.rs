@@ -4,9 +4,9 @@ use std::ffi::{c_char, c_int, c_uint, c_void};
 use std::ptr::null_mut;
 use std::sync::Arc;
 
-use super::handle::{ask, call};
 use super::memory::{bytes, put, text};
 use super::objects::{MasterObject, Owner, ec_domain_t, ec_master_t, ec_slave_config_t};
+use super::waiting::{ask, call};
 use crate::code::{Code, Outcome};
 use crate::network::{Network, Source};
 

@@ -5,8 +5,9 @@ use std::ptr::null_mut;
 
 use ringcat::{RegisterAddress, RegisterRequest, Services};
 
-use super::handle::{Handle, Kind, ask, call};
+use super::handle::{Handle, Kind};
 use super::objects::{SlaveObject, ec_reg_request_t, ec_sdo_request_t, ec_slave_config_t};
+use super::waiting::{ask, call};
 use crate::bus::Bus;
 use crate::code::{Code, Outcome};
 use crate::request::Requested;

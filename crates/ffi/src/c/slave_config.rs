@@ -8,9 +8,10 @@ use libc::in_addr;
 use ringcat::{DomainId, Entry, EntryPlace, IpSettings, PdoEntry, SdoDownload, SubDeviceInfo};
 
 use super::cyclic::put_bit;
-use super::handle::{alive, call, call_for};
+use super::handle::alive;
 use super::memory::{bytes, list, text};
 use super::objects::{SlaveObject, ec_domain_t, ec_slave_config_t};
+use super::waiting::{call, call_for};
 use crate::code::{Code, Outcome};
 use crate::draft::Draft;
 use crate::settings::{Settings, address};

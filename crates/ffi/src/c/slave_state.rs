@@ -7,6 +7,7 @@ use ringcat::{Position, SubDeviceStatus};
 use super::handle::{call, call_for};
 use super::memory::put;
 use super::objects::{SlaveObject, ec_slave_config_t};
+use super::waiting::{self, uncancelled};
 use crate::code::{Code, Outcome};
 use crate::types::SlaveConfigState;
 
@@ -33,7 +34,7 @@ fn state_of(slave: &SlaveObject) -> Outcome<SlaveConfigState> {
     }
     let position = master.look(|draft| draft.info(slave.index).map(|info| info.position))?;
     let Some(Position(position)) = position else { return Ok(pack(false, false, 0)) };
-    let read = master.bus()?.supervisor().subdevice(Position(position)).state();
+    let read = uncancelled(|| Ok(master.bus()?.supervisor().subdevice(Position(position)).state()))?;
     let al_state = read.ok().and_then(|it| it.status.al_state());
     Ok(pack(al_state.is_some(), false, al_state.map_or(0, |state| state.code())))
 }
@@ -47,7 +48,7 @@ unsafe extern "C" fn ecrt_slave_config_emerg_size(sc: *mut ec_slave_config_t, el
         slave.emergencies.use_now(|own| *own = Some(ring))
     };
     // SAFETY: a handle of the library (ecrt.h).
-    unsafe { call(sc, create) }
+    unsafe { waiting::call(sc, create) }
 }
 
 #[unsafe(no_mangle)]

@@ -5,10 +5,10 @@ use std::ptr::null_mut;
 
 use ringcat::{Idn, Services, SoeRequest, VoeHandler};
 
-use super::handle::{ask, call};
 use super::memory::put;
 use super::objects::{SlaveObject, ec_slave_config_t, ec_soe_request_t, ec_voe_handler_t};
 use super::requests::{ERROR, create};
+use super::waiting::{ask, call};
 use crate::bus::Bus;
 use crate::code::{Code, Outcome};
 use crate::request::Requested;

@@ -2,9 +2,9 @@
 
 use std::ffi::c_int;
 
-use super::handle::call;
 use super::memory::{bytes, put};
 use super::objects::{MasterObject, ec_master_t};
+use super::waiting::call;
 use crate::code::{Code, Outcome};
 use crate::mailbox::{Failed, download, read_idn, upload, write_idn};
 

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::daemon::Bench;
 use crate::library::{here, outputs, program};
 
 /// The call with which a guarded function ends.
@@ -37,6 +38,7 @@ fn is_guarded(body: &str) -> bool {
         // The last expression.
         let call = statement.trim_start_matches("unsafe {").trim();
         let call = if call.is_empty() { lines.next().unwrap_or("").trim() } else { call };
+        let call = call.trim_start_matches("waiting::");
         let is_call = GUARDS.iter().chain(&PASSING).any(|guard| call.starts_with(guard));
         return is_call && lines.all(|line| line.starts_with("     ") || line.trim_start().starts_with(['}', ')']));
     }
@@ -92,4 +94,21 @@ fn a_panic_within_a_call_fails_its_master_alone_until_that_is_released() {
     assert_eq!(said, "all as expected\n", "{reported}");
     let line = "EtherCAT: Internal error: provoked by a test. The master takes no calls until it is released.";
     assert_eq!(reported.lines().filter(|reported| *reported == line).count(), 1, "{reported}");
+}
+
+/// On a segment in this process, and on one behind sockets of a daemon, as on interfaces.
+// covers: c-interface, daemon
+#[test]
+fn no_call_is_a_cancellation_point() {
+    let Some(cancelled) = program(&here().join("tests/c/cancelled.c"), &["-pthread"]) else { return };
+    let segment = here().join("tests/c/services.toml");
+    let (said, reported, status) = outputs(&cancelled, &segment, &["own"]);
+    assert!(status.success(), "{said}\n{reported}");
+    assert_eq!(said, "no call was cancelled\n", "{reported}");
+    let bench = Bench::start(&segment, "cancelled");
+    let output = bench.command(&cancelled).output().expect("it runs");
+    let (said, reported) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{said}\n{reported}");
+    assert_eq!(said, "no call was cancelled\n", "{reported}");
+    bench.wait_for_preop();
 }
