@@ -24,3 +24,4 @@ mod realtime;
 mod record;
 mod shape;
 mod switches;
+mod tables;
