@@ -9,13 +9,15 @@ use ringcat::daemon::{DaemonLinks, OwnedBus, socket};
 use ringcat::shared_segment::SharedSegment;
 use ringcat::sim::network::Network;
 use ringcat::{
-    Application, ClockConfig, DomainId, DomainState, Links, Options, Required, SubDeviceInfo, SupervisorThread,
-    automatic,
+    Activity, Application, ClockConfig, DomainId, DomainState, Links, Options, Required, SubDeviceInfo,
+    SupervisorThread, automatic,
 };
 
 const DOMAIN: DomainId = DomainId(0);
 const LIMIT: Duration = Duration::from_secs(60);
 const PERIOD: Duration = Duration::from_millis(1);
+/// As in `ecrt_request_master`.
+const POLL: Duration = Duration::from_micros(500);
 
 type App = Application<DaemonLinks, SupervisorThread>;
 
@@ -61,13 +63,25 @@ fn measured_steps(application: &mut App) -> DomainState {
     state
 }
 
-/// `[steps] cycles PERIOD_US COUNT`, `start`, `bring-up`.
+/// How a program starts.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Start {
+    /// As the C interface does: idle operation, whose PDOs come from the dictionaries, then the activation.
+    LikeC,
+    /// Scan and activation, with the PDOs of the SIIs.
+    Scan,
+    /// The same in one step.
+    BringUp,
+}
+
+/// `[steps] cycles PERIOD_US COUNT`, `start-like-c`, `start`, `bring-up`.
 pub fn run(words: &[&str]) {
     match words {
         ["steps", "cycles", period, count] => cycles(measured_steps, period, count),
         ["cycles", period, count] => cycles(measured, period, count),
-        ["start"] => start(false),
-        ["bring-up"] => start(true),
+        ["start-like-c"] => start(Start::LikeC),
+        ["start"] => start(Start::Scan),
+        ["bring-up"] => start(Start::BringUp),
         _ => panic!("{words:?}"),
     }
 }
@@ -116,8 +130,8 @@ fn to_op<L: Links>(application: &mut Application<L, SupervisorThread>, begin: In
     println!("{}", begin.elapsed().as_nanos());
 }
 
-/// From nothing to OP of all SubDevices: scan and activation, or both in one step.
-fn start(is_in_one_step: bool) {
+/// From nothing to OP of all SubDevices.
+fn start(way: Start) {
     let begin = Instant::now();
     let file = std::env::var("RINGCAT_SIM").expect("a segment file");
     let segment = ringcat::esi::load_segment(Path::new(&file)).expect("it is right");
@@ -130,12 +144,30 @@ fn start(is_in_one_step: bool) {
         }
         declaration
     };
-    let supervisor = SupervisorThread::start(halves.1, &Options::default(), || ()).expect("a thread");
-    let mut application = if is_in_one_step {
-        supervisor.bring_up(|scan| declare(&scan.subdevices), halves.0).expect("it fits")
-    } else {
-        let found = supervisor.scan().expect("they answer").subdevices;
-        supervisor.activate(declare(&found), halves.0).expect("it fits")
+    let options = Options::default().with_idle_operation(way == Start::LikeC);
+    let supervisor = SupervisorThread::start(halves.1, &options, || ()).expect("a thread");
+    let mut application = match way {
+        Start::BringUp => supervisor.bring_up(|scan| declare(&scan.subdevices), halves.0).expect("it fits"),
+        Start::Scan => {
+            let found = supervisor.scan().expect("they answer").subdevices;
+            supervisor.activate(declare(&found), halves.0).expect("it fits")
+        }
+        Start::LikeC => {
+            let found = scanned(&supervisor, begin);
+            supervisor.activate(declare(&found), halves.0).expect("it fits")
+        }
     };
     to_op(&mut application, begin);
+}
+
+/// What idle operation has found, once all PDOs are known.
+fn scanned(supervisor: &SupervisorThread, begin: Instant) -> Vec<SubDeviceInfo> {
+    loop {
+        assert!(begin.elapsed() < LIMIT, "it is not scanned");
+        let is_scanned = supervisor.snapshot().expect("it runs").activity == Activity::Scanned;
+        if is_scanned && !supervisor.are_pdos_awaited().expect("it runs") {
+            return supervisor.subdevices().expect("it runs");
+        }
+        std::thread::sleep(POLL);
+    }
 }
