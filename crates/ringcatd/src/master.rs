@@ -28,6 +28,9 @@ use crate::wires::Wires;
 const TELL: Duration = Duration::from_millis(100);
 /// Text of this message, also for the operator.
 const FAILED: &str = "a thread of the daemon has failed";
+/// Why the last frames cannot be written.
+const NO_RECORD: &str = "no frames are kept: RINGCAT_DEBUG_RING=\"yes\" in /etc/ethercat.conf switches the record on, \
+                         from the next start of the service";
 
 /// How a master is driven.
 #[derive(Debug)]
@@ -197,6 +200,9 @@ impl Master {
             Query::Tool(ToolQuery::SetDebugLevel { level }) => Some(level),
             _ => None,
         };
+        if matches!(what, Query::Tool(ToolQuery::Record)) && !self.bus.debug_ring.is_on {
+            return Err(Refusal::Failed(NO_RECORD.to_owned()));
+        }
         let mut answered = self.ask_driver(what, bytes);
         if let Ok((Answer::Tool(ToolAnswer::Master(report)), _)) = &mut answered {
             report.is_orphaned = self.opened().is_none_or(|opened| opened.is_without_device());
@@ -210,8 +216,8 @@ impl Master {
 
     fn ask_driver(&self, what: Query, bytes: Vec<u8>) -> Answered {
         let master = self.number;
-        // Setting the level sends no frame: it is permitted with another MainDevice on the segment.
-        let sends = !matches!(what, Query::Tool(ToolQuery::SetDebugLevel { .. }));
+        // These send no frame: they are permitted with another MainDevice on the segment.
+        let sends = !matches!(what, Query::Tool(ToolQuery::SetDebugLevel { .. } | ToolQuery::Record));
         let supervisor = match &*self.driver.lock() {
             Driver::Daemon(driving, opened) => match self.others.cause().filter(|_| sends) {
                 Some(cause) => return Err(Refusal::Fault { master, cause }),

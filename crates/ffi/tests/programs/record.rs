@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use ringcat::daemon::BusSettings;
+use ringcat::daemon::known::{ToolAnswer, ToolQuery};
+use ringcat::daemon::{Answer, BusSettings, Client, Query};
 use ringcat::sim::cable::DeviceIndex;
 use ringcat::sim::fault::Fault;
 
@@ -52,6 +53,16 @@ fn check(path: &Path) {
     }
 }
 
+/// Requests a file of the application, as `ethercat record` does.
+fn request(socket: &Path) -> PathBuf {
+    let mut client = Client::connect(socket, "test").expect("the daemon is there");
+    let answered = client.ask(0, Query::Tool(ToolQuery::Record), Vec::new()).expect("it is written");
+    match answered.0 {
+        Answer::Tool(ToolAnswer::Record(line)) => line.path.into(),
+        other => panic!("{other:?}"),
+    }
+}
+
 // covers: c-interface, daemon, capture
 #[test]
 fn a_fault_writes_the_frames_of_the_last_seconds() {
@@ -75,6 +86,12 @@ fn a_fault_writes_the_frames_of_the_last_seconds() {
         entries.map(|it| it.file_name().to_string_lossy().into_owned()).collect::<Vec<_>>()
     };
     assert!(!names().iter().any(|name| name.contains("lost")), "nothing was lost: {:?}", names());
+    let requested = request(&bench.socket);
+    assert!(requested.to_string_lossy().ends_with("-requested.pcapng"), "{}", requested.display());
+    check(&requested);
+    // Frames of faults have files of their own.
+    std::fs::remove_file(&requested).expect("it is there");
+    std::thread::sleep(Duration::from_millis(300));
     bench.inside(|segment| segment.network_mut().apply(Fault::PowerOff(DeviceIndex(3))));
     let begin = Instant::now();
     let first = loop {

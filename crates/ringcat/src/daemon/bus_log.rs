@@ -67,9 +67,12 @@ impl Followed {
         self
     }
 
-    /// Also keeps the last frames, and writes them into a file at a fault.
+    /// Also keeps the last frames, and writes them into a file at a fault, or when `ethercat record` requests one.
     #[must_use]
     pub fn with_record(mut self, record: Option<FrameRecord>) -> Followed {
+        if let Some(record) = &record {
+            self.supervisor.publish_record(record.requests());
+        }
         self.record = record.map(|record| Arc::new(Mutex::new(record)));
         self
     }
