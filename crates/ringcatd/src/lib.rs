@@ -7,7 +7,7 @@
 //!   a process of its own;
 //! * [`segment_process`]: a simulated segment in a process of its own;
 //! * [`master`]: a master with its links; [`driver`]: the process that drives it; [`driving`]: this daemon while it
-//!   does; [`others`]: another MainDevice that does;
+//!   does; [`others`]: another MainDevice that does; [`installed`]: one that is installed on this host;
 //! * [`ethernet`]: network interfaces of EoE, which outlast applications;
 //! * [`owner`]: queries to an application that drives a master; [`tenure`]: its time, and what ends it;
 //!   [`process_state`]: what the kernel shows of its process; [`owner_lock`]: what of it outlives the daemon;
@@ -27,6 +27,7 @@ pub mod device;
 pub mod driver;
 pub mod driving;
 pub mod ethernet;
+pub mod installed;
 pub mod listening;
 pub mod log;
 pub mod master;
