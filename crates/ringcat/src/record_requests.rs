@@ -12,7 +12,7 @@ const MOST: usize = 16;
 
 /// A file that was written.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct WrittenRecord {
+pub(crate) struct WrittenRecord {
     /// Its path.
     pub path: PathBuf,
     /// Frames in it.
@@ -22,11 +22,11 @@ pub struct WrittenRecord {
 }
 
 /// The answer to a request; an error is for the operator.
-pub type Written = Result<WrittenRecord, String>;
+pub(crate) type Written = Result<WrittenRecord, String>;
 
 /// Why there is no file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum NoRecord {
+pub(crate) enum NoRecord {
     /// No frames are kept.
     NotKept,
     /// The recording has ended with what drove the bus.
@@ -39,7 +39,7 @@ pub enum NoRecord {
 
 /// Where requests are made. Clones are the same place.
 #[derive(Clone, Debug)]
-pub struct RecordRequests(SyncSender<Sender<Written>>);
+pub(crate) struct RecordRequests(SyncSender<Sender<Written>>);
 
 impl RecordRequests {
     /// A place for requests, and its other end.

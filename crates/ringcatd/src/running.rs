@@ -13,6 +13,7 @@ use ringcat_link::operator::Priority;
 use ringcat_link::process::raise_descriptors;
 
 use crate::daemon::Daemon;
+use crate::debug_interfaces::DebugTaps;
 use crate::device::Device;
 use crate::ethernet::EthernetInterfaces;
 use crate::installed;
@@ -116,6 +117,7 @@ fn master(
     let mut settings = Settings::new(option.master, option.source.to_string());
     settings.lock = Some(lock);
     settings.interfaces = setup.has_eoe.then(|| EthernetInterfaces::new(option.master));
+    settings.debug = setup.has_debug_interfaces.then(|| DebugTaps::new(option.master));
     settings.debug_level = setup.debug_level;
     settings.bus = setup.bus.clone();
     if let Some(safe) = setup.safe_states.iter().find(|it| it.master == option.master) {

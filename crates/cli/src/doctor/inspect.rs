@@ -1,7 +1,7 @@
 //! What the doctor reads: files, directories, network interfaces, environment variables. Nothing is changed.
 //!
-//! A machine is its files ([`HostFiles`]), and what its kernel answers; tests have one of their own. A check that is not
-//! possible is [`Unseen`] with its reason, never a guess.
+//! A machine is its files ([`HostFiles`]), and what its kernel answers; tests have one of their own. A check that is
+//! not possible is [`Unseen`] with its reason, never a guess.
 
 use std::path::Path;
 

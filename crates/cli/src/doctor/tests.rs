@@ -11,8 +11,8 @@ use ringcat_link::interface::Unknown;
 use ringcat_link::interface::ethtool::{NoAnswer, Settings};
 
 use super::finding::{Finding, Level, lines};
-use super::inspect::{HostFiles, Inspect, Unseen};
-use specimen::{GOOD, Specimen, assert_finding, of};
+use super::inspect::{HostFiles, Unseen};
+use specimen::{GOOD, Specimen, of};
 
 // covers: bench
 #[test]

@@ -18,8 +18,9 @@ use ringcat_engine::domain::DomainState;
 use ringcat_engine::event::Event;
 use ringcat_link::operator::Priority;
 use ringcat_link::recorder::{FrameReader, FrameRing};
-use ringcat_link::{AlreadyRead, Taps};
+use ringcat_link::{AlreadyRead, FrameNote, Taps};
 
+use super::debug_interfaces::DebugInterfaces;
 use super::record_files::{RecordFiles, RecordReason};
 use crate::record_requests::{RecordRequests, Written, WrittenRecord};
 
@@ -104,6 +105,8 @@ pub struct FrameRecord {
     requested: Receiver<Sender<Written>>,
     /// Requests that the next file answers.
     waiting: Vec<Sender<Written>>,
+    /// They get all frames too.
+    debug: Option<Arc<Mutex<DebugInterfaces>>>,
 }
 
 impl FrameRecord {
@@ -136,6 +139,7 @@ impl FrameRecord {
             requests,
             requested,
             waiting,
+            debug: None,
         })
     }
 
@@ -146,26 +150,29 @@ impl FrameRecord {
         self
     }
 
+    /// From now on debug interfaces get all frames too.
+    pub(super) fn pass_on(&mut self, debug: Arc<Mutex<DebugInterfaces>>) {
+        self.debug = Some(debug);
+    }
+
     /// Takes the frames that were in their queues at the call before, so that the frames of all threads are in the
     /// order of their times.
     pub(super) fn take_frames(&mut self) {
-        let ring = &mut self.ring;
-        let taken: Result<(), Infallible> = self.reader.read(|note, frame| {
-            ring.push(note, frame);
-            Ok(())
-        });
-        match taken {
-            Ok(()) => {}
-        }
+        self.take_from_taps(false);
     }
 
-    /// Takes all frames, also the newest ones.
-    fn take_all_frames(&mut self) {
-        let ring = &mut self.ring;
-        let taken: Result<(), Infallible> = self.reader.read_all(|note, frame| {
+    /// Takes frames, with `all` also the newest ones.
+    fn take_from_taps(&mut self, all: bool) {
+        let FrameRecord { ring, reader, debug, .. } = self;
+        let mut debug = debug.as_ref().map(|debug| debug.lock().unwrap_or_else(PoisonError::into_inner));
+        let take = |note: FrameNote, frame: &[u8]| {
             ring.push(note, frame);
+            if let Some(debug) = &mut debug {
+                debug.put(note, frame);
+            }
             Ok(())
-        });
+        };
+        let taken: Result<(), Infallible> = if all { reader.read_all(take) } else { reader.read(take) };
         match taken {
             Ok(()) => {}
         }
@@ -264,7 +271,7 @@ impl FrameRecord {
         if reason != RecordReason::Requested {
             self.last_written.set(now);
         }
-        self.take_all_frames();
+        self.take_from_taps(true);
         let waiting = std::mem::take(&mut self.waiting);
         let fails =
             |error: &dyn fmt::Display| (Priority::Error, format!("The last frames cannot be written: {error}."));
@@ -319,7 +326,7 @@ fn line(
     }
 }
 
-/// Answers requests. A user who no longer waits gets no answer.
+/// Answers requests. One whose user no longer waits gets no answer.
 fn answer(waiting: &[Sender<Written>], written: &Written) {
     for request in waiting {
         let _ = request.send(written.clone());
