@@ -72,7 +72,7 @@ impl AccessArguments {
         let (cyclic, acyclic) = interfaces.open_halves(thread)?;
         let surroundings = Surroundings::watch(&interfaces, &cyclic);
         let recording = self.recording.start(&interfaces)?;
-        let (cyclic, acyclic) = (recording.tee(EitherLinks::First(cyclic)), recording.tee(acyclic));
+        let (cyclic, acyclic) = (recording.tee(Tee::new(EitherLinks::First(cyclic), None)), recording.tee(acyclic));
         let awake = thread.prepare_process();
         let supervisor = SupervisorThread::start(acyclic, options, move || thread.prepare_supervisor())?;
         Ok(Access { interfaces, supervisor, cyclic, surroundings, recording, daemon_bus: DaemonBus(None), awake })
@@ -97,7 +97,7 @@ impl AccessArguments {
         let (interfaces, recording) = begun.ok_or_else(|| Failure::new("the daemon has handed over no links"))?;
         let recording = recording?;
         let links = bus.take_links().ok_or_else(|| Failure::new("the daemon has handed over no links"))?;
-        let surroundings = match &links {
+        let surroundings = match links.links() {
             EitherLinks::First(links) => Surroundings::watch(&interfaces, links),
             EitherLinks::Second(_) => Surroundings::unwatched(&interfaces),
         };

@@ -10,7 +10,6 @@ mod interface;
 mod kernel;
 mod latency;
 mod limits;
-mod loader_cache;
 mod picture;
 mod processor_list;
 mod processors;

@@ -20,7 +20,9 @@ const USUAL: Duration = Duration::from_secs(30);
 const LONG: Duration = Duration::from_secs(600);
 /// Network interfaces of EoE of a master: their descriptors fit into a message.
 pub const MOST_INTERFACES: usize = 48;
-const _: () = assert!(MOST_INTERFACES + 5 <= ringcat_link::descriptors::MOST);
+/// Debug interfaces of a master: one for each link.
+pub const MOST_DEBUG_INTERFACES: usize = 2;
+const _: () = assert!(MOST_INTERFACES + MOST_DEBUG_INTERFACES + 5 <= ringcat_link::descriptors::MOST);
 
 /// A message.
 #[derive(Clone, Debug, PartialEq)]
@@ -318,7 +320,8 @@ pub struct EventLine {
     pub text: String,
 }
 
-/// A master that is handed over. Descriptors follow in this order: those of the links, a lock, network interfaces.
+/// A master that is handed over. Descriptors follow in this order: those of the links, a lock, network interfaces,
+/// debug interfaces.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct HandedBus {
@@ -328,6 +331,8 @@ pub struct HandedBus {
     pub has_lock: bool,
     /// Network interfaces of EoE.
     pub interfaces: Vec<String>,
+    /// Debug interfaces, at most [`MOST_DEBUG_INTERFACES`]: `ecdbgmX` of the main link, `ecdbgbX` of the backup link.
+    pub debug_interfaces: Vec<String>,
     /// The daemon can switch links ([`Content::SwitchLink`]).
     pub can_switch: bool,
     /// Level of messages: 0 to 2, above as 2 ([`ToolQuery::SetDebugLevel`]). It outlasts hand-overs.
@@ -376,7 +381,8 @@ impl HandedBus {
     /// These links and nothing else.
     pub fn new(links: HandedLinks) -> HandedBus {
         let settings = BusSettings::default();
-        HandedBus { links, has_lock: false, interfaces: Vec::new(), can_switch: false, debug_level: 0, settings }
+        let (interfaces, debug_interfaces) = (Vec::new(), Vec::new());
+        HandedBus { links, has_lock: false, interfaces, debug_interfaces, can_switch: false, debug_level: 0, settings }
     }
 }
 

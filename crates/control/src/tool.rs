@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 pub use lines::{
     AreaLine, ClockFeatures, CycleReport, DeclaredLine, DeclaredSyncManager, Description, DomainLine, EntryLine,
     EthernetLine, IdnLine, IpParameters, LinkReport, MasterReport, ObjectLine, PdoEntryLine, PdoLine, PortLine,
-    PortsLine, SdoLine, SiiLine, SubDeviceLine, SyncLine, SyncManagerLine, Traffic, TrafficRate, TransferLine,
-    TransferWork,
+    PortsLine, RecordLine, SdoLine, SiiLine, SubDeviceLine, SyncLine, SyncManagerLine, Traffic, TrafficRate,
+    TransferLine, TransferWork,
 };
 
 /// Most SubDevices in one answer to [`ToolQuery::SubDevices`] and [`ToolQuery::Ports`].
@@ -158,6 +158,8 @@ pub enum ToolQuery {
     Domains,
     /// Network interfaces of EoE.
     Ethernet,
+    /// Writes the last frames into a file, and waits for it.
+    Record,
 }
 
 impl ToolQuery {
@@ -173,10 +175,11 @@ impl ToolQuery {
                 | ToolQuery::UrgentWrite { .. }
                 | ToolQuery::SetIp { .. }
                 | ToolQuery::SetDebugLevel { .. }
+                | ToolQuery::Record
         )
     }
 
-    /// Whether it may take minutes: flash memory is erased and written, or read word by word.
+    /// Whether it may take minutes: flash memory is erased and written, or read word by word; a large file is written.
     pub fn is_long(&self) -> bool {
         matches!(
             self,
@@ -184,6 +187,7 @@ impl ToolQuery {
                 | ToolQuery::FileWrite { .. }
                 | ToolQuery::SiiImages { .. }
                 | ToolQuery::SiiWrite { .. }
+                | ToolQuery::Record
         )
     }
 }
@@ -217,6 +221,8 @@ pub enum ToolAnswer {
     Transfers(Vec<TransferLine>),
     /// To [`ToolQuery::Ethernet`].
     Ethernet(Vec<EthernetLine>),
+    /// To [`ToolQuery::Record`].
+    Record(RecordLine),
 }
 
 /// A piece of a list.

@@ -11,7 +11,7 @@ use crate::message::{Content, Message};
 use crate::refusal::Refusal;
 
 /// Version of the messages. Other versions are refused.
-pub const VERSION: u16 = 7;
+pub const VERSION: u16 = 8;
 /// Bytes of the header.
 pub const HEADER: usize = 16;
 const MAGIC: [u8; 4] = *b"RCTL";

@@ -19,6 +19,7 @@ pub mod ip;
 pub mod master;
 mod matlab;
 pub mod pdos;
+pub mod record;
 pub mod reg_read;
 pub mod reg_write;
 pub mod rescan;

@@ -4,7 +4,7 @@ use crate::command;
 use crate::shape::Command;
 
 /// All commands by name.
-pub const ALL: [&Command; 32] = [
+pub const ALL: [&Command; 33] = [
     &command::alias::COMMAND,
     &command::clocks::COMMAND,
     &command::config::COMMAND,
@@ -22,6 +22,7 @@ pub const ALL: [&Command; 32] = [
     &command::ip::COMMAND,
     &command::master::COMMAND,
     &command::pdos::COMMAND,
+    &command::record::COMMAND,
     &command::reg_read::COMMAND,
     &command::reg_write::COMMAND,
     &command::rescan::COMMAND,
@@ -41,7 +42,7 @@ pub const ALL: [&Command; 32] = [
 
 /// Commands that the original tool does not have. An abbreviation means one of them only where it means none of the
 /// others: scripts go on working.
-pub const OWN: [&str; 4] = ["clocks", "events", "ring", "watch"];
+pub const OWN: [&str; 5] = ["clocks", "events", "record", "ring", "watch"];
 
 /// What an abbreviation stands for.
 #[derive(Debug)]
@@ -115,6 +116,7 @@ mod tests {
             ["events", "clocks", "ring", "watch"]
         );
         assert_eq!(names("r"), ["reg_read", "reg_write", "rescan"]);
+        assert_eq!([names("re"), names("rec")].concat(), ["reg_read", "reg_write", "rescan", "record"]);
         assert_eq!(names("c"), ["config", "crc", "cstruct"]);
         assert!(OWN.iter().all(|own| ALL.iter().any(|command| command.name == *own)));
     }

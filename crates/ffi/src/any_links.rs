@@ -13,18 +13,13 @@ use crate::environment::Source;
 
 /// Links of one half with a tap: those of a daemon, network interfaces that this process opens, which are the same
 /// kind, or a simulated segment. Each cycle tests the kind several times, so each kind occurs once.
-pub type AnyLinks = Tee<EitherLinks<DaemonLinks, SharedSegment>>;
+pub type AnyLinks = EitherLinks<DaemonLinks, Tee<SharedSegment>>;
 
 /// Memory for frames on their way to a record, in which a frame stays for up to 200 ms.
 const QUEUE: usize = 4 << 20;
 
-/// The links of one half of a daemon's bus, and its tap; without one no frame is recorded.
-pub fn of_daemon(links: DaemonLinks, tap: Option<Tap>) -> AnyLinks {
-    Tee::new(EitherLinks::First(links), tap)
-}
-
 /// A tap for one half.
-pub fn tap(taps: &Taps) -> Tap {
+fn tap(taps: &Taps) -> Tap {
     taps.tap_with(QUEUE)
 }
 
@@ -41,18 +36,18 @@ pub fn names(source: &Source) -> Vec<String> {
 /// # Errors
 /// What is wrong, for the operator.
 pub fn open(source: &Source, taps: Option<&Taps>) -> Result<(AnyLinks, AnyLinks), String> {
-    let tee = |links| Tee::new(links, taps.map(tap));
     match source {
         Source::Simulated(file) => {
             let segment = ringcat::esi::load_segment(Path::new(file)).map_err(|error| error.to_string())?;
             let network = Network::from_description(segment).map_err(|error| error.to_string())?;
             let (cyclic, acyclic) = SharedSegment::halves(network);
-            Ok((tee(EitherLinks::Second(cyclic)), tee(EitherLinks::Second(acyclic))))
+            let second = |links| EitherLinks::Second(Tee::new(links, taps.map(tap)));
+            Ok((second(cyclic), second(acyclic)))
         }
         Source::Interfaces(main, redundant) => {
             let opened = PacketLinks::open_halves(main, redundant.as_deref(), ReceiveMode::Blocking);
             let (cyclic, acyclic) = opened.map_err(|error| error.to_string())?;
-            let first = |links| tee(EitherLinks::First(DaemonLinks::First(links)));
+            let first = |links| EitherLinks::First(Tee::new(EitherLinks::First(links), taps.map(tap)));
             Ok((first(cyclic), first(acyclic)))
         }
     }

@@ -13,7 +13,6 @@ use ringcat::daemon::{
     BusLog, BusSettings, ClientError, DaemonError, Followed, FrameRecord, OwnedBus, OwnershipWatch, Refusal,
     options_with,
 };
-use ringcat::tee::Tee;
 use ringcat::{Options, Retries, SubDeviceInfo, SupervisorThread, Taps, realtime};
 
 use crate::any_links::{self, AnyLinks};
@@ -180,17 +179,12 @@ impl Bus {
     fn of_daemon(socket: &Path, master: u32) -> Result<Bus, TakeError> {
         let _held = HeldSignals::hold();
         let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
-        // Until the settings are known the acyclic half has a tap without a reader.
-        let taps = Taps::new(2);
-        let tap = any_links::tap(&taps);
-        let around = |_: &_, links| Ok(Tee::new(links, tap));
-        let taken = OwnedBus::take_with(socket, master, &program_name(), &options, realtime::leave, around);
-        let mut owned = taken?;
+        let mut owned = OwnedBus::take(socket, master, &program_name(), &options, realtime::leave)?;
         let other = |text: String| TakeError::Other(Code::GONE, text);
         let links = owned.take_links().ok_or_else(|| other("the daemon has handed over no links".to_owned()))?;
-        let taps = owned.settings().debug_ring.is_on.then_some(taps);
+        let taps = owned.taps().filter(|_| owned.settings().debug_ring.is_on).cloned();
         let (supervisor, names) = (owned.supervisor().clone(), owned.handed().names());
-        let cyclic = any_links::of_daemon(links, taps.as_ref().map(any_links::tap));
+        let cyclic = AnyLinks::First(links);
         Bus::with(master, supervisor, cyclic, (Origin::Daemon(Box::new(owned)), taps, names)).map_err(other)
     }
 
@@ -200,10 +194,11 @@ impl Bus {
         cyclic: AnyLinks,
         (origin, taps, names): (Origin, Option<Taps>, Vec<String>),
     ) -> Result<Bus, String> {
-        let (settings, owned) = match origin {
+        let (settings, mut owned) = match origin {
             Origin::Here(settings) => (settings, None),
             Origin::Daemon(owned) => (owned.settings().clone(), Some(*owned)),
         };
+        let debug = owned.as_mut().and_then(OwnedBus::take_debug_interfaces);
         let ownership = owned.as_ref().map(|owned| owned.ownership().clone());
         let followed = Followed::new(supervisor.clone()).with_ownership(ownership.clone());
         let record = taps.and_then(|taps| {
@@ -212,6 +207,7 @@ impl Bus {
             started.inspect_err(|error| report(format_args!("frames are not kept: {error}{}", memory_hint()))).ok()
         });
         let followed = followed.with_cyclic_lines(settings.prints_cyclic_lines).with_record(record);
+        let followed = followed.with_debug_interfaces(debug);
         let log = BusLog::start(followed, realtime::leave, move |priority, line| match master {
             0 => report_as(priority, format_args!("{line}")),
             _ => report_as(priority, format_args!("master {master}: {line}")),

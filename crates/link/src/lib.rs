@@ -10,6 +10,7 @@
 //! * [`waiting`]: sleeping or spinning until a frame arrives or a time is reached; [`wake_up`]: ending such a wait from
 //!   another thread;
 //! * [`interface`], [`carrier`]: the interfaces of the host, their other users, their carrier;
+//! * [`host_files`]: files and variables of the host; [`foreign`]: another MainDevice that is installed on it;
 //! * [`tap`]: TAP interfaces, network interfaces whose other end is this process;
 //! * [`monotonic`], [`realtime`]: the host's clock, scheduling, memory locking, processor latency;
 //! * [`operator`]: lines on the standard error and in the journal, without waiting;
@@ -30,8 +31,10 @@ pub mod carrier;
 pub mod descriptors;
 mod error;
 pub mod filter;
+pub mod foreign;
 pub mod frame_pipe;
 pub mod heartbeat;
+pub mod host_files;
 pub mod interface;
 pub mod job;
 mod kernel;

@@ -221,6 +221,14 @@ impl TapInterface {
         kernel::named(&self.name).is_ok_and(|mut request| ioctl(&self.fd, TUNGETIFF, &mut request).is_ok())
     }
 
+    /// Whether it is switched on. Works in any network namespace, without a permission (since Linux 5.2).
+    pub fn is_up(&self) -> bool {
+        let mut polled = [libc::pollfd { fd: self.fd.as_raw_fd(), events: libc::POLLOUT, revents: 0 }];
+        // The kernel reports room for frames only while the interface is up.
+        kernel::poll(&mut polled, libc::timespec { tv_sec: 0, tv_nsec: 0 });
+        polled[0].revents & (libc::POLLOUT | libc::POLLERR) == libc::POLLOUT
+    }
+
     fn set_mac(&self, mac: [u8; MAC_LEN]) -> Result<(), i32> {
         let mut request = kernel::named(&self.name)?;
         let mut address = libc::sockaddr { sa_family: libc::ARPHRD_ETHER, sa_data: [0; 14] };

@@ -22,6 +22,7 @@
 
 mod application;
 mod bus_log;
+mod debug_interfaces;
 mod error;
 mod ethernet;
 mod frame_record;
@@ -42,6 +43,7 @@ mod tool;
 
 pub use application::socket;
 pub use bus_log::{BusLog, Followed, Lines, OperatorLines, Priority};
+pub use debug_interfaces::DebugInterfaces;
 pub use error::DaemonError;
 pub use frame_record::{FrameRecord, LastWritten, RecordError};
 pub use links::{DaemonLinks, adopt_links};

@@ -112,6 +112,8 @@ pub mod piped;
 mod probe;
 mod process_data;
 mod readiness;
+#[cfg(feature = "daemon")]
+mod record_requests;
 #[cfg(any(feature = "eni", feature = "esi"))]
 pub mod regular_file;
 pub mod services;

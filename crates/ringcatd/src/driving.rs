@@ -4,7 +4,8 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use ringcat::daemon::{
-    BusLog, BusSettings, Followed, FrameRecord, LastWritten, Lines, RecordReason, adopt_links, options_with, serving,
+    BusLog, BusSettings, DebugInterfaces, Followed, FrameRecord, LastWritten, Lines, RecordReason, adopt_links,
+    options_with, serving,
 };
 use ringcat::eoe::{Ethernet, EthernetEvent, EthernetOptions};
 use ringcat::foreign::{ListeningPhase, ListeningState, QuietLinks};
@@ -13,7 +14,9 @@ use ringcat::{
     Activity, AlState, Error, Handover, Knowledge, Links, LogFilter, LogLevel, Options, Retries, Services, Snapshot,
     StateScope, SupervisorThread, Taps,
 };
+use ringcat_link::TapInterface;
 
+use crate::debug_interfaces::DebugTaps;
 use crate::ethernet::EthernetInterfaces;
 use crate::log::{print, say};
 use crate::opened::Opened;
@@ -50,6 +53,8 @@ pub struct Lasting<'a> {
     pub settings: &'a BusSettings,
     /// Network interfaces of EoE; `None`: there are none.
     pub interfaces: Option<Arc<EthernetInterfaces>>,
+    /// Debug interfaces; `None`: there are none.
+    pub debug: Option<&'a DebugTaps>,
     /// Frames received on the links: nothing is sent before.
     pub listened: Arc<ListeningState>,
 }
@@ -74,7 +79,7 @@ impl Driving {
         let (cyclic, acyclic) = adopted.map_err(|error| error.to_string())?;
         let main_address = acyclic.addresses().main.0;
         let acyclic = QuietLinks::new(acyclic, cyclic, lasting.listened.clone(), opened.clone());
-        let (acyclic, record) = recorded(acyclic, opened, lasting, handover);
+        let (acyclic, record, debug) = observed(acyclic, opened, lasting, handover);
         let options = Options::default().with_idle_operation(true).with_retries(Retries::OnRequest);
         let options = options_with(lasting.settings, &options).with_dictionaries(true);
         let supervisor = match Knowledge::from_bytes(lasting.knowledge) {
@@ -87,6 +92,7 @@ impl Driving {
         supervisor.set_log_filter(level).map_err(|error| error.to_string())?;
         let followed = Followed::new(supervisor.clone()).with_lines(lasting.lines.clone());
         let followed = followed.with_cyclic_lines(lasting.settings.prints_cyclic_lines).with_record(record);
+        let followed = followed.with_debug_interfaces(debug);
         let number = lasting.number;
         let log = BusLog::start(
             followed,
@@ -151,32 +157,44 @@ impl Driving {
     }
 }
 
-/// Links whose frames are recorded for a file at a fault, if the settings require it. The end of an application without
-/// a release is such a fault.
-fn recorded<L: Links>(
+/// Links whose frames are recorded for a file at a fault, and are on debug interfaces, if the settings require it.
+fn observed<L: Links>(
     links: L,
     opened: &Opened,
     lasting: &Lasting<'_>,
     handover: Handover,
-) -> (Tee<L>, Option<FrameRecord>) {
+) -> (Tee<L>, Option<FrameRecord>, Option<DebugInterfaces>) {
+    let names = opened.links().names();
+    let made = lasting.debug.map(|debug| debug.all(names.len())).unwrap_or_default();
+    // One that was removed meanwhile is no interface any more.
+    let interfaces: Vec<TapInterface> =
+        made.into_iter().filter_map(|(_, descriptor)| TapInterface::adopt(descriptor).ok()).collect();
+    if !lasting.settings.debug_ring.is_on && interfaces.is_empty() {
+        return (Tee::new(links, None), None, None);
+    }
+    let taps = Taps::new(names.len());
+    let debug = (!interfaces.is_empty()).then(|| DebugInterfaces::new(&taps, interfaces));
+    (Tee::new(links, taps.tap_with(QUEUE)), record(&taps, names, lasting, handover), debug)
+}
+
+/// The record of the last frames, if the settings require it. The end of an application without a release is a fault.
+fn record(taps: &Taps, names: Vec<String>, lasting: &Lasting<'_>, handover: Handover) -> Option<FrameRecord> {
     let ring = &lasting.settings.debug_ring;
     if !ring.is_on {
-        return (Tee::new(links, None), None);
+        return None;
     }
-    let names = opened.links().names();
-    let taps = Taps::new(names.len());
-    let mut record = match FrameRecord::start(&taps, lasting.number, names, ring.clone()) {
+    let mut record = match FrameRecord::start(taps, lasting.number, names, ring.clone()) {
         Ok(record) => record.with_last_written(lasting.last_written.clone()),
         Err(error) => {
             // The master is driven without it.
             say(format_args!("master {}: frames are not kept: {error}", lasting.number));
-            return (Tee::new(links, None), None);
+            return None;
         }
     };
     if handover == Handover::AfterCrash && !lasting.knowledge.is_empty() {
         record.note(RecordReason::OwnerLost, Instant::now());
     }
-    (Tee::new(links, taps.tap_with(QUEUE)), Some(record))
+    Some(record)
 }
 
 /// Waits until no SubDevice changes its state any more, and until the PDOs of dictionaries are read that are about to

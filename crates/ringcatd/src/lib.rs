@@ -7,8 +7,9 @@
 //!   a process of its own;
 //! * [`segment_process`]: a simulated segment in a process of its own;
 //! * [`master`]: a master with its links; [`driver`]: the process that drives it; [`driving`]: this daemon while it
-//!   does; [`others`]: another MainDevice that does;
-//! * [`ethernet`]: network interfaces of EoE, which outlast applications;
+//!   does; [`others`]: another MainDevice that does; [`installed`]: one that is installed on this host;
+//! * [`ethernet`]: network interfaces of EoE, which outlast applications; [`debug_interfaces`]: those with all frames
+//!   of a master;
 //! * [`owner`]: queries to an application that drives a master; [`tenure`]: its time, and what ends it;
 //!   [`process_state`]: what the kernel shows of its process; [`owner_lock`]: what of it outlives the daemon;
 //! * [`listening`], [`session`], [`rights`]: clients, their requests and permissions;
@@ -23,10 +24,12 @@
 pub mod check;
 pub mod conf;
 pub mod daemon;
+pub mod debug_interfaces;
 pub mod device;
 pub mod driver;
 pub mod driving;
 pub mod ethernet;
+pub mod installed;
 pub mod listening;
 pub mod log;
 pub mod master;

@@ -14,6 +14,7 @@ use ringcat_control::message::{Answer, HandedBus, MasterState, Query, ToolAnswer
 use ringcat_control::{BusSettings, Content, Message, Refusal};
 use ringcat_link::TapInterface;
 
+use crate::debug_interfaces::DebugTaps;
 use crate::driver::{CHANGE, Current, Driver};
 use crate::driving::{Driving, Lasting};
 use crate::ethernet::EthernetInterfaces;
@@ -28,6 +29,9 @@ use crate::wires::Wires;
 const TELL: Duration = Duration::from_millis(100);
 /// Text of this message, also for the operator.
 const FAILED: &str = "a thread of the daemon has failed";
+/// Why the last frames cannot be written.
+const NO_RECORD: &str = "no frames are kept: RINGCAT_DEBUG_RING=\"yes\" in /etc/ethercat.conf switches the record on, \
+                         from the next start of the service";
 
 /// How a master is driven.
 #[derive(Debug)]
@@ -42,6 +46,8 @@ pub struct Settings {
     pub lock: Option<OwnerLock>,
     /// Network interfaces of EoE; `None`: none is made.
     pub interfaces: Option<EthernetInterfaces>,
+    /// Debug interfaces; `None`: none is made.
+    pub debug: Option<DebugTaps>,
     /// Level of messages at the beginning.
     pub debug_level: u32,
     /// Settings, for the daemon and for applications.
@@ -52,7 +58,7 @@ impl Settings {
     /// PREOP, without a lock, network interfaces and messages.
     pub fn new(number: u32, links: String) -> Settings {
         let (safe_state, bus) = (AlState::PreOp, BusSettings::default());
-        Settings { number, links, safe_state, lock: None, interfaces: None, debug_level: 0, bus }
+        Settings { number, links, safe_state, lock: None, interfaces: None, debug: None, debug_level: 0, bus }
     }
 }
 
@@ -67,6 +73,8 @@ pub struct Master {
     driver: Current,
     /// Network interfaces of EoE; `None`: none is to be made.
     interfaces: Option<Arc<EthernetInterfaces>>,
+    /// Debug interfaces; `None`: none is to be made.
+    debug: Option<DebugTaps>,
     /// What is known of the segment while the daemon does not drive it.
     knowledge: Mutex<Vec<u8>>,
     /// What was printed of the bus.
@@ -130,7 +138,7 @@ impl Master {
 
     /// The same with settings. Links that cannot be opened are tried again by [`Master::supervise`].
     pub fn start(settings: Settings, wires: Wires) -> Master {
-        let Settings { number, links, safe_state, lock, interfaces, debug_level, bus } = settings;
+        let Settings { number, links, safe_state, lock, interfaces, debug, debug_level, bus } = settings;
         let is_shared = wires.are_shared();
         let master = Master {
             number,
@@ -140,6 +148,7 @@ impl Master {
             lock: Mutex::new(lock),
             driver: Current::default(),
             interfaces: interfaces.map(Arc::new),
+            debug,
             knowledge: Mutex::default(),
             lines: Arc::default(),
             last_written: LastWritten::default(),
@@ -155,6 +164,7 @@ impl Master {
     /// The end of the daemon: network interfaces last as long as an application has them.
     pub fn end(&self) {
         self.interfaces.iter().for_each(|interfaces| interfaces.end());
+        self.debug.iter().for_each(DebugTaps::end);
     }
 
     /// Prepares sockets for the next time that the daemon takes the master back. Takes tens of milliseconds, without a
@@ -197,6 +207,9 @@ impl Master {
             Query::Tool(ToolQuery::SetDebugLevel { level }) => Some(level),
             _ => None,
         };
+        if matches!(what, Query::Tool(ToolQuery::Record)) && !self.bus.debug_ring.is_on {
+            return Err(Refusal::Failed(NO_RECORD.to_owned()));
+        }
         let mut answered = self.ask_driver(what, bytes);
         if let Ok((Answer::Tool(ToolAnswer::Master(report)), _)) = &mut answered {
             report.is_orphaned = self.opened().is_none_or(|opened| opened.is_without_device());
@@ -210,8 +223,8 @@ impl Master {
 
     fn ask_driver(&self, what: Query, bytes: Vec<u8>) -> Answered {
         let master = self.number;
-        // Setting the level sends no frame: it is permitted with another MainDevice on the segment.
-        let sends = !matches!(what, Query::Tool(ToolQuery::SetDebugLevel { .. }));
+        // These send no frame: they are permitted with another MainDevice on the segment.
+        let sends = !matches!(what, Query::Tool(ToolQuery::SetDebugLevel { .. } | ToolQuery::Record));
         let supervisor = match &*self.driver.lock() {
             Driver::Daemon(driving, opened) => match self.others.cause().filter(|_| sends) {
                 Some(cause) => return Err(Refusal::Fault { master, cause }),
@@ -268,17 +281,19 @@ impl Master {
             }
             None => Vec::new(),
         };
+        let debug = self.debug.as_ref().map(|debug| debug.all(opened.links().names().len())).unwrap_or_default();
         let mut lock = locked(&self.lock);
         lock.iter_mut().for_each(|lock| lock.note(owner.owner()));
         let mut handed = HandedBus::new(opened.links().clone());
         handed.has_lock = lock.is_some();
         handed.interfaces = interfaces.iter().map(|(name, _)| name.clone()).collect();
+        handed.debug_interfaces = debug.iter().map(|(name, _)| name.clone()).collect();
         handed.can_switch = opened.can_switch();
         handed.settings = self.bus.clone();
         handed.debug_level = self.debug_level.load(Ordering::Acquire);
         let mut raw: Vec<_> = opened.descriptors().iter().map(AsRawFd::as_raw_fd).collect();
         raw.extend(lock.iter().map(OwnerLock::descriptor));
-        raw.extend(interfaces.iter().map(|(_, descriptor)| descriptor.as_raw_fd()));
+        raw.extend(interfaces.iter().chain(&debug).map(|(_, descriptor)| descriptor.as_raw_fd()));
         owner.connection().send_with(&Message { content: Content::Taken(handed), bytes: knowledge }, &raw)
     }
 
@@ -423,11 +438,12 @@ impl Master {
         let opened = Arc::new(locked(&self.wires).open()?);
         let knowledge = locked(&self.knowledge);
         let (lines, debug_level) = (self.lines.clone(), self.debug_level.load(Ordering::Acquire));
-        let interfaces = self.interfaces.clone();
+        let (interfaces, debug) = (self.interfaces.clone(), self.debug.as_ref());
         let listened = self.others.listened();
         let (number, settings, last_written) = (self.number, &self.bus, self.last_written.clone());
         let knowledge = &knowledge[..];
-        let lasting = Lasting { number, knowledge, lines, last_written, debug_level, settings, interfaces, listened };
+        let lasting =
+            Lasting { number, knowledge, lines, last_written, debug_level, settings, interfaces, debug, listened };
         let driving = Driving::start(&opened, &lasting, handover)?;
         for absent in opened.absent() {
             say(format_args!("master {}: interface {absent} is not there; the ring goes on without it", self.number));
@@ -444,47 +460,4 @@ impl Master {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::os::unix::net::UnixStream;
-    use std::path::Path;
-
-    use ringcat::piped::segment::PipedSegment;
-    use ringcat::sim::network::Network;
-    use ringcat::sim::segment::Segment;
-    use ringcat_control::Limits;
-
-    use super::*;
-    use crate::owner::for_tests;
-    use crate::segment_process;
-
-    // covers: daemon
-    #[test]
-    fn a_thread_that_fails_leaves_the_master_to_the_daemon() {
-        let (near, far) = UnixStream::pair().expect("a pair");
-        // It ends with the daemon's socket and pipes.
-        std::thread::spawn(move || {
-            let described = Segment::from_toml("[segment]\n[[device]]\ntype = \"servo\"\n", Path::new("."));
-            let network = Network::from_description(described.expect("it is right")).expect("it is right");
-            segment_process::serve(&mut PipedSegment::new(network), &far, |_| true).expect("a socket");
-        });
-        let master = Master::new(0, "test".to_owned(), Wires::to_segment(near).expect("it is right"));
-        let (owner, far) = for_tests().expect("a pair");
-        let owner = Arc::new(owner);
-        let failed = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-            let _tenancy = master.hand_over(&owner).expect("the daemon drives it");
-            panic!("expected by the test");
-        }));
-        assert!(failed.is_err());
-        assert!(matches!(owner.ask(Query::State, Vec::new()), Err(Refusal::Changing { .. })));
-        let fault = master.state().fault.expect("nothing drives it");
-        assert_eq!(fault, FAILED);
-        let content = far.receive_with_descriptors(Limits::OWNER, None).expect("the links were sent").0.content;
-        assert!(matches!(content, Content::Taken(_)), "{content:?}");
-        let content = far.receive(Limits::OWNER, None).expect("it gets a message");
-        assert_eq!(content, Content::TakenBack { cause: FAILED.to_owned() }.into());
-        master.supervise();
-        assert_eq!((master.state().fault, master.state().owner), (None, None));
-        master.hand_over(&owner).expect("the daemon drives it").end(End::Ended);
-        assert_eq!((master.state().fault, master.state().owner), (None, None));
-    }
-}
+mod tests;

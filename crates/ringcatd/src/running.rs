@@ -8,13 +8,15 @@ use ringcat_control::message::{Answer, Query};
 use ringcat_control::socket::to_listen_at;
 use ringcat_link::HeldSignals;
 use ringcat_link::capabilities::{Capabilities, keep};
-use ringcat_link::interface::exclusive_use;
+use ringcat_link::interface::{UseWarning, exclusive_use};
 use ringcat_link::operator::Priority;
 use ringcat_link::process::raise_descriptors;
 
 use crate::daemon::Daemon;
+use crate::debug_interfaces::DebugTaps;
 use crate::device::Device;
 use crate::ethernet::EthernetInterfaces;
+use crate::installed;
 use crate::listening::Prepared;
 use crate::log::{flush, print, say};
 use crate::master::{Master, Settings};
@@ -59,13 +61,14 @@ pub fn run(setup: &Setup) -> Result<(), String> {
     let mut up_down = UpDown::start(&setup.up_down);
     let mut masters = Vec::new();
     for option in &setup.masters {
-        warn_of_others(option);
+        warn_of_others(option, setup.ends_with_input);
         let started = master(setup, option, &path, &opener);
         masters.push(started.map_err(|error| format!("master {}: {error}", option.master))?);
     }
     // The command that has started it waits itself.
     if !setup.ends_with_input {
         masters.iter().for_each(Master::listen);
+        installed::report();
     }
     let daemon = Daemon::serve(masters, socket, Duration::from_millis(setup.stop_limit))?;
     say(format_args!("listens at {}", path.display()));
@@ -88,12 +91,13 @@ fn end_with_input() -> Result<(), String> {
 }
 
 /// Reports what else uses the interfaces of a master, before it has sockets of its own. An interface that is to be
-/// chosen is one that nothing else uses.
-fn warn_of_others(option: &MasterOption) {
+/// chosen is one that nothing else uses. A service reports kernel modules with all else that is installed.
+fn warn_of_others(option: &MasterOption, with_modules: bool) {
     let named = option.source.devices().filter(|device| **device != Device::First);
     // An interface that does not exist yet has no users.
     let found = named.filter_map(|device| device.find(&[]).ok().flatten());
-    for warning in found.flat_map(|found| exclusive_use(&found.name)) {
+    let warnings = found.flat_map(|found| exclusive_use(&found.name));
+    for warning in warnings.filter(|it| with_modules || !matches!(it, UseWarning::KernelModule { .. })) {
         print(Priority::Warning, format!("ringcatd: master {}: {warning}", option.master));
     }
 }
@@ -113,6 +117,7 @@ fn master(
     let mut settings = Settings::new(option.master, option.source.to_string());
     settings.lock = Some(lock);
     settings.interfaces = setup.has_eoe.then(|| EthernetInterfaces::new(option.master));
+    settings.debug = setup.has_debug_interfaces.then(|| DebugTaps::new(option.master));
     settings.debug_level = setup.debug_level;
     settings.bus = setup.bus.clone();
     if let Some(safe) = setup.safe_states.iter().find(|it| it.master == option.master) {

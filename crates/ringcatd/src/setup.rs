@@ -51,6 +51,12 @@ pub struct SetupOptions {
     /// when applications begin and end. Needs CAP_NET_ADMIN.
     #[arg(long)]
     pub no_eoe: bool,
+    /// Make debug interfaces: ecdbgmX and, of a ring, ecdbgbX with the master's number X
+    ///
+    /// While one is up (ip link set ecdbgm0 up), tcpdump and Wireshark see all frames of the link on it, also those of
+    /// an application. Needs CAP_NET_ADMIN.
+    #[arg(long)]
+    pub debug_if: bool,
     /// End with the standard input: the daemon of one command
     #[arg(long, hide = true)]
     pub while_input_is_open: bool,
@@ -74,6 +80,8 @@ pub struct Setup {
     pub safe_states: Vec<SafeState>,
     /// Whether there are network interfaces of EoE.
     pub has_eoe: bool,
+    /// Whether there are debug interfaces.
+    pub has_debug_interfaces: bool,
     /// Interfaces that are switched on and off with it.
     pub up_down: Vec<String>,
     /// Level of messages at the beginning.
@@ -109,6 +117,7 @@ impl Setup {
             stop_limit: options.stop_limit.or(own.stop_limit).unwrap_or(STOP_LIMIT),
             safe_states,
             has_eoe: !options.no_eoe && own.eoe.unwrap_or(true),
+            has_debug_interfaces: options.debug_if || own.has_debug_interfaces,
             up_down,
             debug_level: own.debug_level.unwrap_or(0),
             bus: own.bus,
@@ -152,11 +161,22 @@ mod tests {
         let conf = || Conf::from_bytes(text.as_bytes()).expect("it is right");
         let setup = Setup::new(SetupOptions::default(), conf()).expect("it fits");
         assert_eq!((setup.rights.mode, setup.stop_limit, setup.has_eoe), (0o664, 7, true));
+        assert!(!setup.has_debug_interfaces);
         let safe = "0=SAFEOP".parse().expect("it is right");
         let options =
             SetupOptions { mode: Some(0o666), no_eoe: true, safe_states: vec![safe], ..SetupOptions::default() };
         let setup = Setup::new(options, conf()).expect("it fits");
         assert_eq!((setup.rights.mode, setup.stop_limit, setup.has_eoe), (0o666, 7, false));
+        let with = |text: &str, debug_if| {
+            let conf = Conf::from_bytes(format!("MASTER0_DEVICE=eth0\n{text}").as_bytes()).expect("it is right");
+            Setup::new(SetupOptions { debug_if, ..SetupOptions::default() }, conf)
+                .expect("it fits")
+                .has_debug_interfaces
+        };
+        assert_eq!(
+            [with("", true), with("RINGCAT_DEBUG_IF=yes", false), with("RINGCAT_DEBUG_IF=no", false)],
+            [true, true, false]
+        );
         // The first that names a master counts.
         assert_eq!(setup.safe_states[0], safe);
         let masters = vec!["0=a".parse().expect("right"), "1=b,c".parse().expect("right")];

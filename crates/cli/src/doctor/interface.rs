@@ -159,7 +159,7 @@ fn manager(machine: &dyn Inspect, interface: &Interface) -> Result<Finding, Unse
     let (name, index) = (&interface.name, interface.index);
     let runs = inspect::running(machine, &["NetworkManager"])?.is_some();
     let file = format!("/run/NetworkManager/devices/{index}");
-    let state = if runs { inspect::read_if_there(machine, &file)? } else { None };
+    let state = if runs { machine.read_if_there(&file)? } else { None };
     let managed = |key: &str| state.as_deref().and_then(|text| text.lines().find_map(|line| line.strip_prefix(key)));
     match managed("managed=") {
         Some("true") => {

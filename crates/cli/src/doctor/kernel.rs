@@ -27,7 +27,7 @@ pub fn checks(machine: &dyn Inspect) -> Vec<Finding> {
 
 fn kind(machine: &dyn Inspect) -> Result<Finding, Unseen> {
     let release = machine.read("/proc/sys/kernel/osrelease")?;
-    let is_real_time = match inspect::read_if_there(machine, "/sys/kernel/realtime")? {
+    let is_real_time = match machine.read_if_there("/sys/kernel/realtime")? {
         Some(text) => text == "1",
         None => machine.read("/proc/sys/kernel/version")?.split_whitespace().any(|word| word == "PREEMPT_RT"),
     };

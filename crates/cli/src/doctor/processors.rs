@@ -78,7 +78,7 @@ fn sleep_states(machine: &dyn Inspect) -> Result<Finding, Unseen> {
         for state in states.iter().filter(|name| name.starts_with("state")).take(MOST) {
             let (latency, is_disabled) =
                 (format!("{directory}/{state}/latency"), format!("{directory}/{state}/disable"));
-            if inspect::read_if_there(machine, &is_disabled)?.is_some_and(|text| text != "0") {
+            if machine.read_if_there(&is_disabled)?.is_some_and(|text| text != "0") {
                 continue;
             }
             let us = inspect::number(machine, &latency)?;
@@ -112,7 +112,7 @@ fn governors(machine: &dyn Inspect) -> Result<Finding, Unseen> {
     let mut seen = 0;
     for processor in online(machine)?.iter().take(MOST) {
         let path = format!("{PROCESSORS}/cpu{processor}/cpufreq/scaling_governor");
-        let Some(governor) = inspect::read_if_there(machine, &path)? else { continue };
+        let Some(governor) = machine.read_if_there(&path)? else { continue };
         seen += 1;
         if governor != "performance" && !others.contains(&governor) {
             others.push(governor);
@@ -139,7 +139,7 @@ fn tick(machine: &dyn Inspect) -> Result<Finding, Unseen> {
     let path = format!("{PROCESSORS}/nohz_full");
     // Without the directory, its absence shows nothing.
     online(machine)?;
-    let text = match inspect::read_if_there(machine, &path)? {
+    let text = match machine.read_if_there(&path)? {
         None => {
             return Ok(TICK.minor("this kernel cannot stop the timer interrupt", &["take a kernel with NO_HZ_FULL"]));
         }
@@ -201,7 +201,7 @@ fn is_of(line: &str, number: &str, interfaces: &[&str]) -> bool {
 
 fn siblings(machine: &dyn Inspect) -> Result<Finding, Unseen> {
     online(machine)?;
-    Ok(match inspect::read_if_there(machine, &format!("{PROCESSORS}/smt/active"))?.as_deref() {
+    Ok(match machine.read_if_there(&format!("{PROCESSORS}/smt/active"))?.as_deref() {
         None => SIBLINGS.good("this kernel reports none"),
         Some("0") => SIBLINGS.good("each core has one thread"),
         Some(_) => SIBLINGS

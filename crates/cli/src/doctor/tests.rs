@@ -11,9 +11,8 @@ use ringcat_link::interface::Unknown;
 use ringcat_link::interface::ethtool::{NoAnswer, Settings};
 
 use super::finding::{Finding, Level, lines};
-use super::inspect::{Inspect, Unseen};
-use super::loader_cache;
-use specimen::{GOOD, Specimen, assert_finding, of};
+use super::inspect::{HostFiles, Unseen};
+use specimen::{GOOD, Specimen, of};
 
 // covers: bench
 #[test]
@@ -111,17 +110,4 @@ fn a_word_is_found_wherever_it_is_in_a_file() {
         assert_eq!(specimen.holds("/file", b"RingCAT"), Ok(true), "{before}");
         assert_eq!(specimen.holds("/file", b"RingDOG"), Ok(false), "{before}");
     }
-}
-
-// covers: bench
-#[test]
-fn the_library_that_the_loader_takes_first_is_checked() {
-    let mut specimen = Specimen::good();
-    let entries =
-        [(loader_cache::NAME, "/opt/other/lib/libethercat.so.1"), (loader_cache::NAME, "/usr/lib/libethercat.so.1")];
-    specimen.write("etc/ld.so.cache", &loader_cache::tests::cache(&entries));
-    let what = "/opt/other/lib/libethercat.so.1 is not RingCAT's, and comes before /usr/lib/libethercat.so.1";
-    assert_finding(&specimen.checks(), "ethercat-library", Level::Bad, what, "LD_LIBRARY_PATH");
-    specimen.variables.insert("LD_LIBRARY_PATH", "/usr/lib:/opt/other/lib");
-    assert_finding(&specimen.checks(), "ethercat-library", Level::Good, "/usr/lib/libethercat.so.1 is RingCAT's", "");
 }

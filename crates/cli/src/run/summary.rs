@@ -171,7 +171,7 @@ pub fn final_account(links: &mut WireLinks, supervisor: &SupervisorThread, names
     }
     for link in [Link::Main, Link::Redundant] {
         // Pipes to a simulated segment have none.
-        let EitherLinks::First(packets) = links.links() else { break };
+        let EitherLinks::First(packets) = links.links().links() else { break };
         let Some(counters) = packets.counters(link) else { continue };
         say!(
             "  process data on {link}: {} sent, {} received, {} overrun",

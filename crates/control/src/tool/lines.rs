@@ -300,6 +300,17 @@ pub struct IpParameters {
     pub name: Option<Vec<u8>>,
 }
 
+/// A file with the last frames.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RecordLine {
+    /// Its path, on the host of the daemon.
+    pub path: String,
+    /// Frames in it.
+    pub frames: u64,
+    /// Frames that were not recorded since the recording began, because a queue was full.
+    pub lost: u64,
+}
+
 /// A SubDevice that the application has declared.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DeclaredLine {

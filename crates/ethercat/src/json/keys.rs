@@ -82,6 +82,7 @@ fn all() -> Vec<Table> {
         ("`graph`", keys::<texts::Text<'_>>()),
         ("`master`", keys::<master::Master<'_>>()),
         ("`pdos`", keys::<pdos::Pdos<'_>>()),
+        ("`record`", keys::<ring::Record<'_>>()),
         ("`reg_read`", keys::<reads::Registers>()),
         ("`ring`", keys::<ring::Ring>()),
         ("`sdos`", keys::<sdos::Sdos<'_>>()),

@@ -1,4 +1,4 @@
-//! What `ring --json`, `clocks --json` and `events --json` print.
+//! What `ring --json`, `clocks --json`, `events --json` and `record --json` print.
 
 use ringcat_control::message::{CableSnapshot, ClockSnapshot, EventLine, Snapshot};
 use serde::Serialize;
@@ -148,6 +148,20 @@ impl Clock {
             locked: clock.is_locked,
         }
     }
+}
+
+/// A file with the last frames.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub struct Record<'a> {
+    /// Number of the master
+    pub master: u32,
+    /// Path of the file, on the host of the daemon
+    pub path: &'a str,
+    /// Frames in it
+    pub frames: u64,
+    /// Frames that were not recorded since the recording began, because a queue was full
+    pub lost: u64,
 }
 
 /// An event.

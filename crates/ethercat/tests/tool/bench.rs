@@ -10,13 +10,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use ringcat::daemon::OwnedBus;
+use ringcat::daemon::{BusSettings, OwnedBus};
 use ringcat::piped::segment::PipedSegment;
 use ringcat::sim::network::Network;
 use ringcat::sim::segment::Segment;
 use ringcat::{Declaration, DomainId, DomainState, Options, SubDeviceInfo};
 use ringcatd::daemon::{Daemon, STOP_LIMIT};
-use ringcatd::master::Master;
+use ringcatd::master::{Master, Settings};
 use ringcatd::rights::Rights;
 use ringcatd::segment_process;
 use ringcatd::wires::Wires;
@@ -110,7 +110,12 @@ impl Bench {
 
     /// The same with a directory that has files already.
     pub fn start_in(directory: PathBuf, segments: Vec<Segment>) -> Bench {
-        Bench::start_with(directory, segments, Vec::new())
+        Bench::start_with(directory, segments, Vec::new(), &BusSettings::default())
+    }
+
+    /// The same with settings of the masters.
+    pub fn start_set(directory: PathBuf, segments: Vec<Segment>, settings: &BusSettings) -> Bench {
+        Bench::start_with(directory, segments, Vec::new(), settings)
     }
 
     /// The same with a last master whose links cannot be opened.
@@ -126,16 +131,17 @@ impl Bench {
                 break master;
             }
         };
-        Bench::start_with(directory(), segments, vec![waiting])
+        Bench::start_with(directory(), segments, vec![waiting], &BusSettings::default())
     }
 
-    fn start_with(directory: PathBuf, segments: Vec<Segment>, waiting: Vec<Master>) -> Bench {
+    fn start_with(directory: PathBuf, segments: Vec<Segment>, waiting: Vec<Master>, bus: &BusSettings) -> Bench {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let counts: Vec<usize> = segments.iter().map(|segment| segment.devices.len()).collect();
         let (mut masters, mut threads) = (Vec::new(), Vec::new());
         for (number, segment) in (0..).zip(segments) {
             let (wires, thread) = SegmentThread::start(segment);
-            masters.push(Master::new(number, "sim:test".to_owned(), wires));
+            let settings = Settings { bus: bus.clone(), ..Settings::new(number, "sim:test".to_owned()) };
+            masters.push(Master::start(settings, wires));
             threads.push(thread);
         }
         masters.extend(waiting);

@@ -13,6 +13,7 @@ mod idle;
 mod json;
 mod operation;
 mod outputs;
+mod record;
 mod ring_and_clocks;
 mod several;
 mod shells;

@@ -75,7 +75,7 @@ pub struct Bench {
     looks: Sender<Look>,
     daemon: Option<Daemon>,
     segment: Option<JoinHandle<()>>,
-    socket: PathBuf,
+    pub socket: PathBuf,
 }
 
 impl Bench {

@@ -8,7 +8,7 @@
 mod lines;
 
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -18,6 +18,7 @@ pub use ringcat_link::operator::{OperatorLines, Priority};
 
 pub use self::lines::Lines;
 use self::lines::{Counts, Sample};
+use super::debug_interfaces::{DebugInterfaces, FEED};
 use super::frame_record::FrameRecord;
 use super::ownership::OwnershipWatch;
 use super::record_files::RecordReason;
@@ -44,12 +45,14 @@ pub struct Followed {
     /// Also print lines about the results of cyclic frames.
     with_cyclic: bool,
     record: Option<Arc<Mutex<FrameRecord>>>,
+    debug: Option<Arc<Mutex<DebugInterfaces>>>,
 }
 
 impl Followed {
     /// The acyclic half of a bus. All its events are taken from it.
     pub fn new(supervisor: SupervisorThread) -> Followed {
-        Followed { supervisor, ownership: None, lines: Arc::default(), with_cyclic: true, record: None }
+        let (ownership, lines, with_cyclic, record, debug) = (None, Arc::default(), true, None, None);
+        Followed { supervisor, ownership, lines, with_cyclic, record, debug }
     }
 
     /// Also whether the bus of a daemon was taken back.
@@ -67,11 +70,53 @@ impl Followed {
         self
     }
 
-    /// Also keeps the last frames, and writes them into a file at a fault.
+    /// Also keeps the last frames, and writes them into a file at a fault, or when `ethercat record` requests one.
     #[must_use]
     pub fn with_record(mut self, record: Option<FrameRecord>) -> Followed {
+        if let Some(record) = &record {
+            self.supervisor.publish_record(record.requests());
+        }
         self.record = record.map(|record| Arc::new(Mutex::new(record)));
         self
+    }
+
+    /// Also passes all frames on to debug interfaces while these are up.
+    #[must_use]
+    pub fn with_debug_interfaces(mut self, debug: Option<DebugInterfaces>) -> Followed {
+        self.debug = debug.map(|debug| Arc::new(Mutex::new(debug)));
+        self
+    }
+
+    /// A record that reads the taps passes the frames on to debug interfaces.
+    fn join_readers(&self) {
+        if let (Some(record), Some(debug)) = (&self.record, &self.debug) {
+            locked(debug).set_record();
+            locked(record).pass_on(debug.clone());
+        }
+    }
+
+    /// Takes the frames that wait.
+    fn take_frames(&self) {
+        match (&self.record, &self.debug) {
+            (Some(record), _) => locked(record).take_frames(),
+            (None, Some(debug)) => locked(debug).take_frames(),
+            (None, None) => {}
+        }
+    }
+
+    /// Waits for the next check; meanwhile debug interfaces that are up get frames. Whether the log ends.
+    fn wait(&self, ends: &Receiver<()>) -> bool {
+        let until = Instant::now() + LOOK;
+        loop {
+            let left = until.saturating_duration_since(Instant::now());
+            let is_up = self.debug.as_ref().is_some_and(|debug| locked(debug).is_up());
+            let rest = if is_up { left.min(FEED) } else { left };
+            let is_last = ends.recv_timeout(rest) != Err(RecvTimeoutError::Timeout);
+            if is_last || rest == left {
+                return is_last;
+            }
+            self.take_frames();
+        }
     }
 
     /// Goes on with what was printed of this bus before: only changes are printed.
@@ -134,12 +179,18 @@ impl Drop for BusLog {
     }
 }
 
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 fn run(followed: &Followed, ends: &Receiver<()>, ending: Sender<()>, mut print: impl FnMut(Priority, &str)) {
-    let Followed { supervisor, ownership, lines, with_cyclic, record } = followed;
+    let Followed { supervisor, ownership, lines, with_cyclic, record, debug } = followed;
     let (mut looks, mut next_message) = (0_u32, 0);
+    followed.join_readers();
     loop {
-        let is_last = ends.recv_timeout(LOOK) != Err(RecvTimeoutError::Timeout);
+        let is_last = followed.wait(ends);
         looks += 1;
+        followed.take_frames();
         let mut lines = lines.lock().unwrap_or_else(PoisonError::into_inner);
         let mut record = record.as_ref().map(|record| record.lock().unwrap_or_else(PoisonError::into_inner));
         if let Some(ownership) = ownership {
@@ -147,9 +198,6 @@ fn run(followed: &Followed, ends: &Receiver<()>, ending: Sender<()>, mut print: 
             if let Some(record) = record.as_mut().filter(|_| is_new && ownership.is_taken_back()) {
                 record.note(RecordReason::TakenBack, Instant::now());
             }
-        }
-        if let Some(record) = &mut record {
-            record.take_frames();
         }
         take_messages(supervisor, &mut lines, &mut next_message);
         let is_second_over = *with_cyclic && (looks.is_multiple_of(LOOKS_PER_SUMMARY) || is_last);
@@ -159,7 +207,8 @@ fn run(followed: &Followed, ends: &Receiver<()>, ending: Sender<()>, mut print: 
         if let Some(record) = &mut record {
             all.extend(record.look(Instant::now(), supervisor.observer().is_some()));
         }
-        for (priority, line) in all {
+        let passed_on = debug.as_ref().map(|debug| locked(debug).look()).unwrap_or_default();
+        for (priority, line) in all.into_iter().chain(passed_on.into_iter().map(|line| (Priority::Warning, line))) {
             print(priority, &line);
         }
         if is_last {

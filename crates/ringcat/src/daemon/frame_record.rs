@@ -1,12 +1,14 @@
 //! The frames of the last seconds before a fault, as a capture file.
 //!
-//! In: the frames that [`Taps`] see, taken from them ten times a second by the thread of the bus log; events. Out:
-//! files for Wireshark (pcapng), and a line for the operator about each. Without a fault nothing is written. The
-//! cyclic path copies a frame into the queue of its tap, and does nothing else.
+//! In: the frames that [`Taps`] see, taken from them ten times a second by the thread of the bus log; events; requests
+//! of users. Out: files for Wireshark (pcapng), and a line for the operator about each. Without a fault and a request
+//! nothing is written. The cyclic path copies a frame into the queue of its tap, and does nothing else.
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::fmt;
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -16,9 +18,11 @@ use ringcat_engine::domain::DomainState;
 use ringcat_engine::event::Event;
 use ringcat_link::operator::Priority;
 use ringcat_link::recorder::{FrameReader, FrameRing};
-use ringcat_link::{AlreadyRead, Taps};
+use ringcat_link::{AlreadyRead, FrameNote, Taps};
 
+use super::debug_interfaces::DebugInterfaces;
 use super::record_files::{RecordFiles, RecordReason};
+use crate::record_requests::{RecordRequests, Written, WrittenRecord};
 
 /// Frames of this time behind a fault are in its file.
 const AFTER: Duration = Duration::from_millis(200);
@@ -96,6 +100,13 @@ pub struct FrameRecord {
     due: Option<(RecordReason, Instant)>,
     last_written: LastWritten,
     writing: Option<JoinHandle<(Line, FrameRing)>>,
+    /// Where users request a file.
+    requests: RecordRequests,
+    requested: Receiver<Sender<Written>>,
+    /// Requests that the next file answers.
+    waiting: Vec<Sender<Written>>,
+    /// They get all frames too.
+    debug: Option<Arc<Mutex<DebugInterfaces>>>,
 }
 
 impl FrameRecord {
@@ -113,7 +124,23 @@ impl FrameRecord {
         let (ring, spare) = (empty_ring(&settings)?, Some(empty_ring(&settings)?));
         let reader = taps.read().map_err(RecordError::AlreadyRead)?;
         let (domains, due, last_written, writing) = (BTreeMap::new(), None, LastWritten::default(), None);
-        Ok(FrameRecord { reader, ring, spare, settings, master, names, domains, due, last_written, writing })
+        let ((requests, requested), waiting) = (RecordRequests::new(), Vec::new());
+        Ok(FrameRecord {
+            reader,
+            ring,
+            spare,
+            settings,
+            master,
+            names,
+            domains,
+            due,
+            last_written,
+            writing,
+            requests,
+            requested,
+            waiting,
+            debug: None,
+        })
     }
 
     /// Takes into account when another record of this master has written its last file.
@@ -123,36 +150,56 @@ impl FrameRecord {
         self
     }
 
+    /// From now on debug interfaces get all frames too.
+    pub(super) fn pass_on(&mut self, debug: Arc<Mutex<DebugInterfaces>>) {
+        self.debug = Some(debug);
+    }
+
     /// Takes the frames that were in their queues at the call before, so that the frames of all threads are in the
     /// order of their times.
     pub(super) fn take_frames(&mut self) {
-        let ring = &mut self.ring;
-        let taken: Result<(), Infallible> = self.reader.read(|note, frame| {
+        self.take_from_taps(false);
+    }
+
+    /// Takes frames, with `all` also the newest ones.
+    fn take_from_taps(&mut self, all: bool) {
+        let FrameRecord { ring, reader, debug, .. } = self;
+        let mut debug = debug.as_ref().map(|debug| debug.lock().unwrap_or_else(PoisonError::into_inner));
+        let take = |note: FrameNote, frame: &[u8]| {
             ring.push(note, frame);
+            if let Some(debug) = &mut debug {
+                debug.put(note, frame);
+            }
             Ok(())
-        });
+        };
+        let taken: Result<(), Infallible> = if all { reader.read_all(take) } else { reader.read(take) };
         match taken {
             Ok(()) => {}
         }
     }
 
-    /// Takes all frames, also the newest ones.
-    fn take_all_frames(&mut self) {
-        let ring = &mut self.ring;
-        let taken: Result<(), Infallible> = self.reader.read_all(|note, frame| {
-            ring.push(note, frame);
-            Ok(())
-        });
-        match taken {
-            Ok(()) => {}
-        }
+    /// Where users request a file.
+    pub(super) fn requests(&self) -> RecordRequests {
+        self.requests.clone()
     }
 
-    /// A file is written after a short time, unless one was written within the last 10 s.
+    /// A file is written after a short time, unless one of a fault was written within the last 10 s. A file that was
+    /// only requested becomes that of the fault.
     pub fn note(&mut self, reason: RecordReason, now: Instant) {
         let is_soon = self.last_written.at().is_some_and(|at| now.duration_since(at) < PAUSE);
-        if self.due.is_none() && !is_soon {
+        let is_free = self.due.is_none_or(|(due, _)| due == RecordReason::Requested);
+        if is_free && !is_soon {
             self.due = Some((reason, now + AFTER));
+        }
+    }
+
+    /// A request is answered by the file that is due, or by one of its own. There is no pause between such files: a
+    /// user waits for each.
+    fn take_requests(&mut self, now: Instant) {
+        let before = self.waiting.len();
+        self.waiting.extend(self.requested.try_iter());
+        if self.waiting.len() > before && self.due.is_none() {
+            self.due = Some((RecordReason::Requested, now + AFTER));
         }
     }
 
@@ -185,6 +232,7 @@ impl FrameRecord {
             self.domains.values_mut().for_each(|it| it.incomplete_since = None);
             self.note(RecordReason::WorkingCounter, now);
         }
+        self.take_requests(now);
         let mut lines = Vec::new();
         if self.writing.as_ref().is_some_and(JoinHandle::is_finished) {
             lines.extend(self.wait());
@@ -220,13 +268,19 @@ impl FrameRecord {
 
     /// Writes in a thread of its own. Returns a line if that cannot begin.
     fn write(&mut self, reason: RecordReason, now: Instant) -> Option<Line> {
-        self.last_written.set(now);
-        self.take_all_frames();
+        if reason != RecordReason::Requested {
+            self.last_written.set(now);
+        }
+        self.take_from_taps(true);
+        let waiting = std::mem::take(&mut self.waiting);
         let fails =
             |error: &dyn fmt::Display| (Priority::Error, format!("The last frames cannot be written: {error}."));
         let spare = match self.spare.take().map_or_else(|| empty_ring(&self.settings), Ok) {
             Ok(spare) => spare,
-            Err(error) => return Some(fails(&error)),
+            Err(error) => {
+                answer(&waiting, &Err(error.to_string()));
+                return Some(fails(&error));
+            }
         };
         let ring = std::mem::replace(&mut self.ring, spare);
         let (master, names, settings) = (self.master, self.names.clone(), self.settings.clone());
@@ -234,18 +288,13 @@ impl FrameRecord {
         let body = move || {
             let names: Vec<(&str, &str)> = names.iter().map(String::as_str).zip(DESCRIPTIONS).collect();
             let files = RecordFiles { directory: &settings.directory, master, most: settings.files };
-            let line = match files.save(reason, |out| ring.write(out, &names)) {
-                Ok(path) => {
-                    let lacking =
-                        if lost == 0 { String::new() } else { format!(", {lost} since the start are not recorded") };
-                    let text = format!("The last {} frames are in {}{lacking}.", ring.len(), path.display());
-                    (Priority::Warning, text)
-                }
-                Err(error) => {
-                    let place = settings.directory.display();
-                    (Priority::Error, format!("The last frames cannot be written in {place}: {error}."))
-                }
+            let saved = files.save(reason, |out| ring.write(out, &names));
+            let line = line(&saved, (reason, ring.len(), lost), &settings);
+            let written = match saved {
+                Ok(path) => Ok(WrittenRecord { path, frames: ring.len() as u64, lost }),
+                Err(_) => Err(line.1.clone()),
             };
+            answer(&waiting, &written);
             (line, ring)
         };
         match std::thread::Builder::new().name("record".into()).spawn(body) {
@@ -258,6 +307,32 @@ impl FrameRecord {
     }
 }
 
+/// The line about a file, or about why there is none.
+fn line(
+    saved: &std::io::Result<PathBuf>,
+    (reason, frames, lost): (RecordReason, usize, u64),
+    settings: &DebugRing,
+) -> Line {
+    match saved {
+        Ok(path) => {
+            let lacking = if lost == 0 { String::new() } else { format!(", {lost} since the start are not recorded") };
+            let priority = if reason == RecordReason::Requested { Priority::Info } else { Priority::Warning };
+            (priority, format!("The last {frames} frames are in {}{lacking}.", path.display()))
+        }
+        Err(error) => {
+            let place = settings.directory.display();
+            (Priority::Error, format!("The last frames cannot be written in {place}: {error}."))
+        }
+    }
+}
+
+/// Answers requests. One whose user no longer waits gets no answer.
+fn answer(waiting: &[Sender<Written>], written: &Written) {
+    for request in waiting {
+        let _ = request.send(written.clone());
+    }
+}
+
 /// The memory for frames.
 fn empty_ring(settings: &DebugRing) -> Result<FrameRing, RecordError> {
     let memory = |_| RecordError::Memory(settings.bytes);
@@ -266,117 +341,4 @@ fn empty_ring(settings: &DebugRing) -> Result<FrameRing, RecordError> {
 }
 
 #[cfg(test)]
-mod tests {
-    use ringcat_engine::declared::SubDeviceId;
-    use ringcat_engine::domain::{DomainId, DomainStatus};
-    use ringcat_link::pcapng::Direction;
-
-    use std::path::PathBuf;
-
-    use super::*;
-
-    struct Place(PathBuf);
-
-    impl Place {
-        fn new(name: &str) -> Place {
-            let path = std::env::temp_dir().join(format!("ringcat-record-{name}-{}", std::process::id()));
-            std::fs::create_dir_all(&path).expect("it can be made");
-            Place(path)
-        }
-
-        fn files(&self) -> Vec<String> {
-            let entries = std::fs::read_dir(&self.0).expect("it is there").flatten();
-            let mut names: Vec<String> = entries.filter_map(|it| it.file_name().into_string().ok()).collect();
-            names.sort_unstable();
-            names
-        }
-
-        fn record(&self, taps: &Taps, files: u32) -> FrameRecord {
-            let mut settings = DebugRing::default();
-            (settings.directory, settings.files, settings.cycles) = (self.0.clone(), files, 10);
-            FrameRecord::start(taps, 0, vec!["eth1".to_owned()], settings).expect("nothing else reads")
-        }
-    }
-
-    impl Drop for Place {
-        fn drop(&mut self) {
-            // It is below the directory for temporary files.
-            let _ = std::fs::remove_dir_all(&self.0);
-        }
-    }
-
-    fn domain(state: DomainState, incomplete: u64) -> Event {
-        let mut status = DomainStatus::default();
-        status.state = state;
-        Event::Domain { domain: DomainId(0), status, incomplete }
-    }
-
-    // covers: daemon, capture
-    #[test]
-    fn a_fault_writes_the_frames_before_it_and_shortly_after_it() {
-        let place = Place::new("fault");
-        let taps = Taps::new(1);
-        let (mut tap, mut record) = (taps.tap_with(1 << 16), place.record(&taps, 5));
-        let begin = Instant::now();
-        tap.record(0, Direction::Out, 1_000, &[0x11; 60]);
-        record.take_frames();
-        record.take(&Event::Lost { subdevice: SubDeviceId(0) }, begin);
-        assert_eq!(record.look(begin, true), []);
-        tap.record(0, Direction::In, 2_000, &[0x22; 60]);
-        let early = begin + AFTER - Duration::from_millis(1);
-        assert_eq!((record.look(early, true), place.files().len()), (Vec::new(), 0));
-        assert_eq!(record.look(begin + AFTER, true), []);
-        let lines = record.end(begin + AFTER);
-        let [(_, text)] = &lines[..] else { panic!("{lines:?}") };
-        let [file] = &place.files()[..] else { panic!("{:?}", place.files()) };
-        assert!(text.contains("The last 2 frames are in ") && text.contains(file.as_str()), "{text}");
-        assert!(file.starts_with("ringcat-0-") && file.ends_with("-lost.pcapng"), "{file}");
-        let bytes = std::fs::read(place.0.join(file)).expect("it can be read");
-        assert!([[0x11; 60], [0x22; 60]].iter().all(|frame| bytes.windows(60).any(|it| it == frame)));
-    }
-
-    // covers: daemon, capture
-    #[test]
-    fn an_interruption_counts_by_cycles_or_time_and_only_after_a_complete_cycle() {
-        let place = Place::new("cycles");
-        let taps = Taps::new(1);
-        let begin = Instant::now();
-        let due = |events: &[Event], later: Duration| {
-            let mut record = place.record(&taps, 5);
-            events.iter().for_each(|event| record.take(event, begin));
-            record.look(begin + later, true);
-            record.due.map(|(reason, _)| reason)
-        };
-        let complete = domain(DomainState::Complete, 0);
-        let broken = domain(DomainState::Incomplete, 1);
-        let late = INTERRUPTION;
-        assert_eq!(due(std::slice::from_ref(&broken), late), None, "before the first complete cycle");
-        assert_eq!(due(&[complete.clone(), broken.clone()], Duration::ZERO), None);
-        assert_eq!(due(&[complete.clone(), broken.clone()], late), Some(RecordReason::WorkingCounter));
-        let ended = |cycles| [complete.clone(), broken.clone(), domain(DomainState::Complete, cycles)];
-        assert_eq!(due(&ended(9), late), None);
-        assert_eq!(due(&ended(10), late), Some(RecordReason::WorkingCounter));
-    }
-
-    // covers: daemon, capture
-    #[test]
-    fn there_is_a_largest_number_of_files_and_a_pause_between_them() {
-        let place = Place::new("room");
-        std::fs::write(place.0.join("ringcat-01-other.pcapng"), []).expect("it can be written");
-        let (taps, taps_of_next) = (Taps::new(1), Taps::new(1));
-        let mut record = place.record(&taps, 2);
-        let mut now = Instant::now();
-        for round in 0..4 {
-            record.note(RecordReason::LinkDown, now);
-            assert_eq!(record.end(now).len(), 1, "{round}");
-            record.note(RecordReason::LinkDown, now + Duration::from_secs(1));
-            assert_eq!(record.due, None, "a moment after a file");
-            let mut next = place.record(&taps_of_next, 2).with_last_written(record.last_written.clone());
-            next.note(RecordReason::OwnerLost, now + Duration::from_secs(1));
-            assert_eq!(next.due, None, "a moment after a file of the one before");
-            now += PAUSE;
-            std::thread::sleep(Duration::from_millis(2));
-        }
-        assert_eq!(place.files().len(), 3, "two, and one that is not ours: {:?}", place.files());
-    }
-}
+mod tests;

@@ -4,22 +4,35 @@ use std::os::fd::OwnedFd;
 
 use ringcat_control::message::{HandedLink as Handed, HandedLinks};
 use ringcat_control::refusal::Refusal;
-use ringcat_link::{HandedSocket, ReceiveMode};
+use ringcat_link::{HandedSocket, ReceiveMode, Taps};
 
 use super::error::DaemonError;
 use crate::either_links::EitherLinks;
-use crate::links::PerLink;
+use crate::links::{Links, PerLink};
 use crate::packet::{HandedLink, PacketLinks};
 use crate::piped::PipedLinks;
+use crate::tee::Tee;
 
-/// Links of one half that a daemon has handed over: network interfaces, or a simulated segment in another process.
-pub type DaemonLinks = EitherLinks<PacketLinks, PipedLinks>;
+/// Links of one half that a daemon has handed over: network interfaces, or a simulated segment in another process; with
+/// a tap where frames are recorded, or where there are debug interfaces.
+pub type DaemonLinks = Tee<EitherLinks<PacketLinks, PipedLinks>>;
 
-/// Links of the cyclic and of the acyclic half.
+/// Links of one half, without a tap.
+pub type Adopted = EitherLinks<PacketLinks, PipedLinks>;
+
+/// Memory for the frames of a half on their way to what reads the taps, in which a frame stays for up to 200 ms.
+const QUEUE: usize = 4 << 20;
+
+/// A tap of one half.
+pub(super) fn tapped<L: Links>(links: L, taps: Option<&Taps>) -> Tee<L> {
+    Tee::new(links, taps.map(|taps| taps.tap_with(QUEUE)))
+}
+
+/// Links of the cyclic and of the acyclic half, without taps.
 ///
 /// # Errors
 /// The descriptors are not those that are described.
-pub fn adopt_links(links: &HandedLinks, descriptors: Vec<OwnedFd>) -> Result<(DaemonLinks, DaemonLinks), DaemonError> {
+pub fn adopt_links(links: &HandedLinks, descriptors: Vec<OwnedFd>) -> Result<(Adopted, Adopted), DaemonError> {
     let wrong = || {
         let expected = format!("{} descriptors of links of one kind", links.descriptors());
         DaemonError::from(Refusal::Unexpected { expected })

@@ -16,8 +16,10 @@ use ringcat_control::message::{Content, HandedLinks, Message};
 use ringcat_control::settings::BusSettings;
 use ringcat_engine::Scan;
 use ringcat_engine::event::{LogFilter, LogLevel, Subject, Subjects};
-use ringcat_engine::knowledge::Handover;
+use ringcat_engine::knowledge::{Handover, Knowledge};
+use ringcat_link::Taps;
 
+use super::debug_interfaces::{DebugFeed, DebugInterfaces};
 use super::error::DaemonError;
 use super::ethernet::Ethernet;
 use super::links::DaemonLinks;
@@ -27,6 +29,7 @@ use super::query_threads::QueryThreads;
 use super::received::Received;
 use super::receiver::Receiver;
 use super::settings::options_with;
+use crate::error::Error;
 use crate::links::Links;
 use crate::main_device::Options;
 use crate::services::Services;
@@ -55,6 +58,9 @@ pub struct OwnedBus {
     receiver: Option<JoinHandle<()>>,
     /// A child of `fork` has no threads of this: it gives nothing back.
     process: u32,
+    taps: Option<Taps>,
+    /// Passes frames on to debug interfaces.
+    feed: Option<DebugFeed>,
 }
 
 impl OwnedBus {
@@ -92,26 +98,19 @@ impl OwnedBus {
         let connection = Arc::new(Client::connect(socket, program)?.into_connection().patient());
         let orders = Orders::new()?;
         let received = Received::take(&connection, master, &orders)?;
-        let Received { bus: handed, cyclic, acyclic, lock, interfaces, knowledge } = received;
+        let Received { bus: handed, cyclic, acyclic, lock, interfaces, debug_interfaces, taps, knowledge } = received;
         let (in_threads, main) = (prepare.clone(), acyclic.addresses().main);
         let acyclic = around(&handed.links, acyclic)?;
         let (options, is_known) = (options_with(&handed.settings, options), knowledge.is_some());
         let options = options.with_idle_operation(true);
-        let supervisor = match knowledge {
-            Some(knowledge) => {
-                let known = (knowledge, Handover::Orderly);
-                SupervisorThread::start_resumed(acyclic, &options, known, prepare)?
-            }
-            None => SupervisorThread::start(acyclic, &options, prepare)?,
-        };
+        let supervisor = start(acyclic, &options, knowledge, prepare)?;
         supervisor.set_log_filter(LogFilter::new(LogLevel::from_number(handed.debug_level)))?;
         let ethernet = Ethernet::start(&supervisor, (master, main), interfaces, &orders)?;
         let scans = Subjects::NONE.with(Subject::Scan).with(Subject::Cabling);
         let events = supervisor.register_client(scans, KEPT)?;
         // A segment that does not answer any more is watched as any other.
         let scan = if is_known { supervisor.finish_scan(|| ()).ok() } else { None };
-        let queries =
-            QueryThreads::start(&supervisor, &connection, &in_threads).map_err(crate::error::Error::Thread)?;
+        let queries = QueryThreads::start(&supervisor, &connection, &in_threads).map_err(Error::Thread)?;
         let (ownership, links, settings) = (OwnershipWatch::default(), handed.links, handed.settings);
         let receiver = Receiver {
             supervisor: supervisor.clone(),
@@ -122,7 +121,9 @@ impl OwnedBus {
             ethernet: ethernet.clone(),
             events,
         };
-        let receiver = receiver.start(in_threads).map_err(crate::error::Error::Thread)?;
+        let feed = DebugFeed::of(taps.as_ref(), debug_interfaces, in_threads.clone());
+        let feed = feed.map_err(Error::Thread)?;
+        let receiver = receiver.start(in_threads).map_err(Error::Thread)?;
         let (cyclic, receiver, process) = (Some(cyclic), Some(receiver), std::process::id());
         let (handed, links, _lock, _ethernet) = (links, cyclic, lock, ethernet);
         let bus = OwnedBus {
@@ -137,6 +138,8 @@ impl OwnedBus {
             ownership,
             receiver,
             process,
+            taps,
+            feed,
         };
         Ok(bus)
     }
@@ -155,6 +158,18 @@ impl OwnedBus {
     /// priority over the options of this program.
     pub fn settings(&self) -> &BusSettings {
         &self.settings
+    }
+
+    /// Taps of both halves. There are some if the settings require a record ([`FrameRecord`](super::FrameRecord)), and
+    /// if there are debug interfaces.
+    pub fn taps(&self) -> Option<&Taps> {
+        self.taps.as_ref()
+    }
+
+    /// Takes the debug interfaces, for a bus log that reads the taps ([`Followed`](super::Followed)). Until then a
+    /// thread of this bus passes frames on to them, which is the only reader of the taps while an interface is up.
+    pub fn take_debug_interfaces(&mut self) -> Option<DebugInterfaces> {
+        self.feed.take().and_then(DebugFeed::end)
     }
 
     /// Takes the links of the cyclic half, for an activation.
@@ -184,6 +199,7 @@ impl OwnedBus {
 
     fn give_back(&mut self) -> Result<(), DaemonError> {
         let Some(receiver) = self.receiver.take() else { return Ok(()) };
+        self.feed = None;
         if std::process::id() != self.process {
             // A child of `fork`: its parent has the bus, and the threads are not in this process.
             std::mem::forget(receiver);
@@ -211,6 +227,19 @@ impl OwnedBus {
             Ownership::Held if sent.is_ok() && is_answered => Ok(()),
             _ => Err(DaemonError::Lost),
         }
+    }
+}
+
+/// Starts the acyclic half, and goes on with what is known.
+fn start<L: Links + Send + 'static>(
+    links: L,
+    options: &Options,
+    knowledge: Option<Knowledge>,
+    prepare: impl FnOnce() + Send + 'static,
+) -> Result<SupervisorThread, Error> {
+    match knowledge {
+        Some(knowledge) => SupervisorThread::start_resumed(links, options, (knowledge, Handover::Orderly), prepare),
+        None => SupervisorThread::start(links, options, prepare),
     }
 }
 

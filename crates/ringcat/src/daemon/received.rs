@@ -5,13 +5,14 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use ringcat_control::connection::Connection;
-use ringcat_control::message::{Content, HandedBus};
+use ringcat_control::message::{Content, HandedBus, MOST_DEBUG_INTERFACES};
 use ringcat_control::refusal::Refusal;
 use ringcat_control::wire::Limits;
 use ringcat_engine::knowledge::Knowledge;
+use ringcat_link::{TapInterface, Taps};
 
 use super::error::DaemonError;
-use super::links::{DaemonLinks, adopt_links};
+use super::links::{DaemonLinks, adopt_links, tapped};
 use super::orders::Orders;
 use crate::either_links::EitherLinks;
 
@@ -31,6 +32,10 @@ pub(super) struct Received {
     pub lock: Option<OwnedFd>,
     /// Network interfaces of EoE.
     pub interfaces: Vec<OwnedFd>,
+    /// Debug interfaces.
+    pub debug_interfaces: Vec<TapInterface>,
+    /// Taps of both halves, where something may read them.
+    pub taps: Option<Taps>,
     /// What is known of the segment.
     pub knowledge: Option<Knowledge>,
 }
@@ -49,7 +54,8 @@ impl Received {
             _ => return Err(unexpected("links of a master")),
         };
         let (links, lock) = (bus.links.descriptors(), usize::from(bus.has_lock));
-        if descriptors.len() != links + lock + bus.interfaces.len() {
+        let (ethernet, debug) = (bus.interfaces.len(), bus.debug_interfaces.len());
+        if descriptors.len() != links + lock + ethernet + debug || debug > MOST_DEBUG_INTERFACES {
             return Err(unexpected("a descriptor for each part of a bus"));
         }
         let mut descriptors = descriptors.into_iter();
@@ -58,9 +64,15 @@ impl Received {
             EitherLinks::First(links) if bus.can_switch => EitherLinks::First(links.with_switch(orders.clone())),
             links => links,
         };
+        let has_taps = bus.settings.debug_ring.is_on || debug > 0;
+        let taps = has_taps.then(|| Taps::new(bus.links.names().len()));
+        let (cyclic, acyclic) = (tapped(cyclic, taps.as_ref()), tapped(acyclic, taps.as_ref()));
         let lock = descriptors.by_ref().take(lock).next();
+        let interfaces = descriptors.by_ref().take(ethernet).collect();
+        // One that was removed meanwhile is no interface any more.
+        let debug_interfaces = descriptors.filter_map(|descriptor| TapInterface::adopt(descriptor).ok()).collect();
         let knowledge = if message.bytes.is_empty() { None } else { Some(Knowledge::from_bytes(&message.bytes)?) };
-        Ok(Received { bus, cyclic, acyclic, lock, interfaces: descriptors.collect(), knowledge })
+        Ok(Received { bus, cyclic, acyclic, lock, interfaces, debug_interfaces, taps, knowledge })
     }
 }
 

@@ -34,16 +34,19 @@ pub enum RecordReason {
     TakenBack,
     /// The application has ended without a release, or was stopped.
     OwnerLost,
+    /// A user has requested it, without a fault.
+    Requested,
 }
 
 impl RecordReason {
-    const ALL: [RecordReason; 6] = [
+    const ALL: [RecordReason; 7] = [
         RecordReason::Lost,
         RecordReason::StateLeft,
         RecordReason::WorkingCounter,
         RecordReason::LinkDown,
         RecordReason::TakenBack,
         RecordReason::OwnerLost,
+        RecordReason::Requested,
     ];
 
     /// In the name of a file.
@@ -55,7 +58,13 @@ impl RecordReason {
             RecordReason::LinkDown => "link-down",
             RecordReason::TakenBack => "taken-back",
             RecordReason::OwnerLost => "owner-lost",
+            RecordReason::Requested => "requested",
         }
+    }
+
+    /// Whether its files are removed before those of other reasons.
+    const fn is_removed_first(self) -> bool {
+        matches!(self, RecordReason::OwnerLost | RecordReason::Requested)
     }
 }
 
@@ -107,8 +116,8 @@ impl RecordFiles<'_> {
                 let _ = std::fs::remove_file(path);
             }
         }
-        // An application that is started again and again must not remove the file of the fault that ends it.
-        old.sort_unstable_by_key(|((at, reason), _)| (*reason != RecordReason::OwnerLost, *at));
+        // An application that is started again and again, and requests, must not remove the file of a fault.
+        old.sort_unstable_by_key(|((at, reason), _)| (!reason.is_removed_first(), *at));
         let surplus = (old.len() + 1).saturating_sub(self.most as usize);
         for (_, path) in old.iter().take(surplus) {
             let _ = std::fs::remove_file(path);

@@ -6,6 +6,7 @@ mod application;
 mod dictionary;
 mod files;
 mod master;
+mod record;
 mod service;
 mod siis;
 mod subdevices;
@@ -77,6 +78,7 @@ fn act(supervisor: &SupervisorThread, ask: ToolQuery, bytes: Vec<u8>) -> Answere
         ToolQuery::AliasWrite { position, alias, force } => at(position).write_alias(alias, force).map(|_| ()),
         ToolQuery::StartState { position, state } => return start_state(supervisor, position, state),
         ToolQuery::UrgentWrite { position, address } => return write_urgently(supervisor, position, address, bytes),
+        ToolQuery::Record => return record::write(supervisor),
         ToolQuery::SetIp { position, ip } => return set_ip(supervisor, position, ip),
         ToolQuery::SetDebugLevel { level } => supervisor.set_log_filter(LogFilter::new(LogLevel::from_number(level))),
         _ => return Err(expected("a query of this version")),

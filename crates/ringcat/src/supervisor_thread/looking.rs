@@ -8,6 +8,8 @@ use super::SupervisorThread;
 use super::worker::Published;
 use crate::link_figures::LinkFigures;
 use crate::observer::{Observed, Observer};
+#[cfg(feature = "daemon")]
+use crate::record_requests::RecordRequests;
 
 impl Published {
     /// An application shows its process data from now on.
@@ -31,6 +33,18 @@ impl SupervisorThread {
         }
         let samples = self.0.published.samples.lock().unwrap_or_else(PoisonError::into_inner);
         samples.of(link, self.counters())
+    }
+
+    /// Where a file with the last frames is requested becomes known to other threads.
+    #[cfg(feature = "daemon")]
+    pub(crate) fn publish_record(&self, requests: RecordRequests) {
+        *self.0.published.record.lock().unwrap_or_else(PoisonError::into_inner) = Some(requests);
+    }
+
+    /// Where a file with the last frames is requested; `None` where no frames are kept.
+    #[cfg(feature = "daemon")]
+    pub(crate) fn record_requests(&self) -> Option<RecordRequests> {
+        self.0.published.record.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// What the network interfaces of EoE publish becomes known to other threads.

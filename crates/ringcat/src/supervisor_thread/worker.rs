@@ -21,6 +21,8 @@ use crate::links::Links;
 use crate::not_ready::Failures;
 use crate::observer::Observed;
 use crate::of_two::OfTwo;
+#[cfg(feature = "daemon")]
+use crate::record_requests::RecordRequests;
 use crate::window::Window;
 
 /// Longest sleep while tasks read queues that do not end a sleep, or while links have no waker.
@@ -68,6 +70,9 @@ pub(super) struct Published {
     /// What the network interfaces of EoE publish.
     #[cfg(feature = "eoe")]
     pub ethernet: Mutex<Option<Weak<dyn std::any::Any + Send + Sync>>>,
+    /// Where a file with the last frames is requested.
+    #[cfg(feature = "daemon")]
+    pub record: Mutex<Option<RecordRequests>>,
 }
 
 #[derive(Clone, Debug, Default)]

@@ -33,6 +33,8 @@ pub struct Own {
     pub stop_limit: Option<u64>,
     /// Whether there are network interfaces of EoE.
     pub eoe: Option<bool>,
+    /// Whether there are debug interfaces.
+    pub has_debug_interfaces: bool,
     /// Level of messages at the beginning.
     pub debug_level: Option<u32>,
     /// Whether a master waits until its backup interface is there.

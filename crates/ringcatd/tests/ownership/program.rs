@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use ringcat::Options;
 use ringcat::daemon::{Answer, Client, OwnedBus, Query};
 
-use crate::bench::{LONG, ask, directory};
+use crate::bench::{LONG, ask, directory, turn};
 use crate::owner_process::{OwnerProcess, Work};
 use crate::running::{PROGRAM, Running, Start, UNPRIVILEGED, signal, wait_for};
 
@@ -30,6 +30,24 @@ fn the_program_drives_several_masters_each_with_a_segment_in_its_own_process() {
     assert!(running.child.wait().expect("it ends").success());
     assert!(!running.socket.exists(), "the socket is removed");
     running.wait_for_segments(0);
+}
+
+// covers: daemon
+#[test]
+fn the_program_reports_another_maindevice_that_is_installed_and_goes_on() {
+    let (turn, directory) = (turn(), directory());
+    for name in ["ethercat", "ecrt.h", "libethercat.so.1"] {
+        std::fs::write(directory.join(name), "other").expect("it can be written");
+    }
+    let names = ["PATH", "CPATH", "LD_LIBRARY_PATH"];
+    let variables = names.map(|name| (name, directory.clone().into_os_string()));
+    let start = Start { counts: &[1], variables: &variables, ..Start::default() };
+    let running = Running::at(&start, directory.clone(), turn);
+    wait_for(&mut running.client(), 0, 1);
+    for name in ["ethercat", "ecrt.h", "libethercat.so.1"] {
+        let wanted = format!("{} is not RingCAT's", directory.join(name).display());
+        running.wait_for_lines(|lines| lines.iter().any(|line| line.contains(&wanted)));
+    }
 }
 
 // covers: daemon

@@ -195,6 +195,16 @@ impl Bench {
         fetch.env(ADDRESS, address).stdin(Stdio::null()).stderr(Stdio::null()).status().expect("it runs").success()
     }
 
+    /// Runs a role with an interface of the near namespace, until it ends.
+    pub fn with_interface(&self, role: &str, name: &str) {
+        let mut process = self.role(&self.near, role, &[]);
+        // The input of a role is open as long as it runs.
+        let mut process = process.env(ADDRESS, name).stdin(Stdio::piped()).spawn().expect("it starts");
+        let input = process.stdin.take();
+        assert!(process.wait().expect("it ends").success(), "{role} {name}: {:#?}", self.lines());
+        drop(input);
+    }
+
     pub fn socket(&self) -> PathBuf {
         self.place.join("socket")
     }

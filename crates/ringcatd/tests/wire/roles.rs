@@ -16,7 +16,7 @@ use ringcat::{Event, Options, Services, automatic};
 use ringcat_control::message::HandedBus;
 use ringcat_control::{Client, Content, Limits};
 use ringcat_engine::{Class, class_of};
-use ringcat_link::{PacketOptions, PacketSocket, PresentInterface, ReceiveMode, monotonic, wait};
+use ringcat_link::{PacketOptions, PacketSocket, PresentInterface, ReceiveMode, Sniffer, monotonic, wait};
 
 use crate::bench::LONG;
 
@@ -51,6 +51,8 @@ fn a_process_of_another_test_plays_its_role() {
             std::thread::spawn(end_with_the_test);
             match role {
                 "segment" => segment(&place),
+                "listen" => listen(&place),
+                "inject" => inject(),
                 "switch" => switch(&place),
                 role => application(&place, role),
             }
@@ -73,6 +75,51 @@ fn fetch() {
     let mut said = String::new();
     stream.read_to_string(&mut said).expect("it answers");
     assert!(said.starts_with("HTTP/1"), "{said}");
+}
+
+/// Counts frames on an interface for half a second: sent cyclic ones, received cyclic ones, sent acyclic ones, received
+/// acyclic ones. A SubDevice that executes a datagram changes its working counter.
+fn listen(place: &Path) {
+    let name = std::env::var(ADDRESS).expect("the test says which");
+    let mut sniffer = Sniffer::open(&name, true).expect("it can be opened");
+    let (mut counts, mut others) = ([[0_u32; 2]; 2], 0_u32);
+    let begin = Instant::now();
+    while begin.elapsed() < Duration::from_millis(500) {
+        wait(&[sniffer.socket()], monotonic::now_ns() + 20_000_000, ReceiveMode::Blocking);
+        while sniffer.next(&mut |passed| match (class_of(passed.frame), is_executed(passed.frame)) {
+            (Some(class), Some(is_received)) => {
+                counts[usize::from(class == Class::Acyclic)][usize::from(is_received)] += 1;
+            }
+            _ => others += 1,
+        }) {}
+    }
+    let [[sent, received], [sent_acyclic, received_acyclic]] = counts;
+    let text = format!("{sent} {received} {sent_acyclic} {received_acyclic} {others}");
+    fs::write(place.join("listened"), text).expect("it can be written");
+    std::process::exit(0);
+}
+
+/// Whether the first datagram of a frame has a working counter.
+fn is_executed(frame: &[u8]) -> Option<bool> {
+    let length = usize::from(u16::from_le_bytes(frame.get(22..24)?.try_into().ok()?) & 0x7FF);
+    Some(frame.get(26 + length..28 + length)? != [0; 2])
+}
+
+/// Sends frames into an interface that request INIT of all SubDevices: the kernel may refuse them.
+fn inject() {
+    let name = std::env::var(ADDRESS).expect("the test says which");
+    let mut socket = PacketSocket::open(&name, &PacketOptions::default()).expect("it can be opened");
+    let mut frame = [0_u8; 60];
+    frame[..6].fill(0xFF);
+    frame[6] = 2;
+    frame[12..14].copy_from_slice(&[0x88, 0xA4]);
+    // One BWR of AL Control, 2 bytes.
+    frame[14..16].copy_from_slice(&[14, 0x10]);
+    frame[16..28].copy_from_slice(&[8, 0x7F, 0, 0, 0x20, 0x01, 2, 0, 0, 0, 1, 0]);
+    for _ in 0..200 {
+        socket.send(&frame);
+    }
+    std::process::exit(0);
 }
 
 /// An owner that orders the main link down, and ends without ordering it up.

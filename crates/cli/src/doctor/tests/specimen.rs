@@ -10,7 +10,7 @@ use ringcat_link::interface::{Interface, Uses};
 
 use super::super::check_all;
 use super::super::finding::{Finding, Level, lines};
-use super::super::inspect::Inspect;
+use super::super::inspect::{HostFiles, Inspect};
 
 /// As long as names of interfaces can be.
 pub const NAME: &str = "enp12s0f1np1abc";
@@ -30,11 +30,17 @@ impl Drop for Specimen {
     }
 }
 
-impl Inspect for Specimen {
+impl HostFiles for Specimen {
     fn root(&self) -> &Path {
         &self.root
     }
 
+    fn variable(&self, name: &str) -> Option<String> {
+        self.variables.get(name).map(|value| (*value).to_owned())
+    }
+}
+
+impl Inspect for Specimen {
     fn interface(&self, name: &str) -> Option<Interface> {
         (name == self.interface.name).then(|| self.interface.clone())
     }
@@ -45,10 +51,6 @@ impl Inspect for Specimen {
 
     fn settings(&self, _: &str) -> Settings {
         self.settings.clone()
-    }
-
-    fn variable(&self, name: &str) -> Option<String> {
-        self.variables.get(name).map(|value| (*value).to_owned())
     }
 }
 

@@ -23,7 +23,7 @@ impl Reading {
         match name {
             _ if BusSettings::variables().any(|it| it == name) && !is_set => Ok("empty: the default".to_owned()),
             _ if BusSettings::variables().any(|it| it == name) => own.bus.set(name, value),
-            "SOCKET" | "MODE" | "GROUP" | "STOP_LIMIT" | "EOE" | "DEBUG_LEVEL" | "BACKUP" if !is_set => {
+            "SOCKET" | "MODE" | "GROUP" | "STOP_LIMIT" | "EOE" | "DEBUG_IF" | "DEBUG_LEVEL" | "BACKUP" if !is_set => {
                 Ok("empty: the default".to_owned())
             }
             "SOCKET" if !value.starts_with('/') => Err(format!("expected a path from /, got {value:?}")),
@@ -49,6 +49,10 @@ impl Reading {
                 own.eoe = Some(has);
                 Ok(format!("{} network interfaces for EoE", if has { "makes" } else { "makes no" }))
             }
+            "DEBUG_IF" => {
+                own.has_debug_interfaces = choice(value, &[("yes", true), ("no", false)])?;
+                Ok(format!("{} debug interfaces", if own.has_debug_interfaces { "makes" } else { "makes no" }))
+            }
             "DEBUG_LEVEL" => {
                 let level = number(value, 0, MOST_DEBUG)?;
                 own.debug_level = Some(level);
@@ -61,8 +65,8 @@ impl Reading {
                 Ok(if own.needs_backup { waits } else { goes_on }.to_owned())
             }
             _ => Err(format!(
-                "expected RINGCAT_SOCKET, _MODE, _GROUP, _STOP_LIMIT, _EOE, _DEBUG_LEVEL, _BACKUP, _{}, _MASTERx_SIM \
-                 or _MASTERx_SAFE_STATE",
+                "expected RINGCAT_SOCKET, _MODE, _GROUP, _STOP_LIMIT, _EOE, _DEBUG_IF, _DEBUG_LEVEL, _BACKUP, _{}, \
+                 _MASTERx_SIM or _MASTERx_SAFE_STATE",
                 BusSettings::variables().collect::<Vec<_>>().join(", _")
             )),
         }

@@ -57,7 +57,7 @@ fn each_variable_of_the_manual_is_honoured_or_explained() {
 fn variables_of_ringcat_are_the_options_of_the_daemon() {
     let text = "RINGCAT_MASTER0_SIM=/srv/a.toml\nRINGCAT_MASTER0_SAFE_STATE=safeop\nRINGCAT_SOCKET=/run/x\n\
                 RINGCAT_MODE=0664\nRINGCAT_GROUP=44\nRINGCAT_STOP_LIMIT=250\nRINGCAT_EOE=no\nRINGCAT_DEBUG_LEVEL=1\n\
-                RINGCAT_BACKUP=required\nRINGCAT_REGALIAS=yes\n";
+                RINGCAT_BACKUP=required\nRINGCAT_DEBUG_IF=yes\nRINGCAT_REGALIAS=yes\n";
     let mut bus = BusSettings::default();
     bus.reads_alias_register = true;
     let safe_states = vec![crate::source::SafeState { master: 0, state: AlState::SafeOp }];
@@ -67,6 +67,7 @@ fn variables_of_ringcat_are_the_options_of_the_daemon() {
         group: Some(44),
         stop_limit: Some(250),
         eoe: Some(false),
+        has_debug_interfaces: true,
         debug_level: Some(1),
         needs_backup: true,
         bus,
@@ -75,11 +76,11 @@ fn variables_of_ringcat_are_the_options_of_the_daemon() {
     let conf = read(text);
     assert_eq!(conf.own, expected);
     assert_eq!(conf.masters[0].source, Source::Simulated("/srv/a.toml".into()));
-    assert_eq!(conf.understood.len(), 10);
+    assert_eq!(conf.understood.len(), 11);
     assert_eq!(meaning(&conf, "RINGCAT_REGALIAS"), "aliases are those of register 0x0012");
     let empty = "MASTER0_DEVICE=a\nRINGCAT_SOCKET=\nRINGCAT_MODE=\nRINGCAT_GROUP=\nRINGCAT_STOP_LIMIT=\nRINGCAT_EOE=\n\
                  RINGCAT_DEBUG_LEVEL=\nRINGCAT_BACKUP=\nRINGCAT_MASTER0_SIM=\nRINGCAT_MASTER7_SAFE_STATE=\n\
-                 RINGCAT_WILDCARDS=\nRINGCAT_DEBUG_RING_FILES=\n";
+                 RINGCAT_WILDCARDS=\nRINGCAT_DEBUG_RING_FILES=\nRINGCAT_DEBUG_IF=\n";
     assert_eq!(read(empty).own, Own::default());
 }
 
