@@ -53,7 +53,6 @@ pub mod recorder;
 mod rx_ring;
 pub mod signals;
 pub mod sniffer;
-#[cfg(target_pointer_width = "64")]
 mod system_call;
 pub mod tap;
 pub mod terminal;
