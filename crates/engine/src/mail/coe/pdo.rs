@@ -60,7 +60,8 @@ impl<'a> Lists<'a> {
                         return Ok(entries);
                     }
                 }
-                Err(error) if error.is_missing_object() || error.is_interrupted() => return Err(error),
+                Err(error) if error.is_interrupted() => return Err(error),
+                // Subindex 0 shows whether the object is missing.
                 Err(_) => {}
             }
             self.complete_access = false;

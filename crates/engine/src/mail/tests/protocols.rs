@@ -155,12 +155,12 @@ fn lists_are_read_whole_or_by_entries_if_the_answer_is_no_list() {
         assert_eq!(result, Ok(pdos.clone()), "{complete_access}");
         assert_eq!(bench.device.server.uploads, uploads, "{complete_access}");
     }
-    // What is missing is reported as such.
+    // What is missing is reported as such once its subindex 0 is missing, too.
     let mut bench = Bench::new(LinkSet::Single, 128);
     let mailbox = bench.mailbox.clone();
     let error = bench
         .run(async move { Lists::new(&mailbox, LIMITS).with_complete_access(true).assignment(3).await.unwrap_err() });
-    assert!(error.is_missing_object() && bench.device.server.uploads == 1, "{error}");
+    assert!(error.is_missing_object() && bench.device.server.uploads == 2, "{error}");
 }
 
 // covers: 6.3, sdo-information
