@@ -153,7 +153,7 @@ impl Exchange {
     /// Process data for the other MainDevice: what leaves in this role, in the length of its direction (protocol
     /// FR-15). A change of the role does not change the bytes.
     pub fn to_partner_mut(&mut self) -> &mut [u8] {
-        self.standby.0.as_deref_mut().map_or(&mut [], |state| state.data.to_mut(state.role))
+        self.standby.0.as_deref_mut().map_or(&mut [], |state| state.data.outgoing_mut(state.role))
     }
 
     /// Process data of the other MainDevice, of the last cycle in which all of it has arrived; empty before, also after
@@ -164,7 +164,7 @@ impl Exchange {
             MainDeviceRole::Active => state.frames.to_active_cycle.is_some(),
             MainDeviceRole::Inactive => state.shown.is_some() && state.following.whole().is_some(),
         };
-        if has_arrived { state.data.from(state.role) } else { &[] }
+        if has_arrived { state.data.incoming(state.role) } else { &[] }
     }
 
     /// Gives back the memory of the application for process data between both MainDevices

@@ -49,22 +49,22 @@ impl PartnerData {
     }
 
     /// What leaves in a role.
-    pub fn to(&self, role: MainDeviceRole) -> &[u8] {
+    pub fn outgoing(&self, role: MainDeviceRole) -> &[u8] {
         &self.to[..self.lengths[usize::from(role == MainDeviceRole::Inactive)]]
     }
 
     /// The same, to be written.
-    pub fn to_mut(&mut self, role: MainDeviceRole) -> &mut [u8] {
+    pub fn outgoing_mut(&mut self, role: MainDeviceRole) -> &mut [u8] {
         &mut self.to[..self.lengths[usize::from(role == MainDeviceRole::Inactive)]]
     }
 
     /// What arrives in a role.
-    pub fn from(&self, role: MainDeviceRole) -> &[u8] {
+    pub fn incoming(&self, role: MainDeviceRole) -> &[u8] {
         &self.from[..self.lengths[usize::from(role == MainDeviceRole::Active)]]
     }
 
     /// The same, to be written.
-    pub fn from_mut(&mut self, role: MainDeviceRole) -> &mut [u8] {
+    pub fn incoming_mut(&mut self, role: MainDeviceRole) -> &mut [u8] {
         &mut self.from[..self.lengths[usize::from(role == MainDeviceRole::Active)]]
     }
 }
