@@ -1,5 +1,6 @@
 //! `ringcat sim`: a simulated segment behind real network interfaces, for this MainDevice and for those of others.
 
+mod gaps;
 mod lateness;
 mod mail_orders;
 mod names;
@@ -104,6 +105,7 @@ pub fn run(arguments: &SimArguments) -> Result<Report, Failure> {
     say(begin, &format!("{} SubDevices are on the wire", plant.network().devices().len()));
     loop {
         let now = wires.turn(plant.network_mut());
+        plant.note_outputs();
         for (place, link) in HostLink::ALL.into_iter().enumerate().take(names.len()) {
             let up = carriers.carrier(place).is_up();
             if plant.set_carrier(link, up) {

@@ -13,7 +13,7 @@ use core::fmt;
 
 #[cfg(feature = "standby")]
 pub(crate) use control::Taken;
-pub use control::{RoleCause, RoleControl, RoleRequest};
+pub use control::{Requester, RoleCause, RoleControl, RoleRequest};
 #[cfg(feature = "standby")]
 pub use partner::Partner;
 

@@ -120,7 +120,7 @@ impl<T: 'static> Reply<T> {
                 self.send(result);
                 return true;
             }
-            // A procedure that was ended by a stop of the MainDevice has no result.
+            // A procedure that was ended by a stop or a change of the role has no result.
             !is_running || !self.is_wanted()
         })
     }
@@ -147,7 +147,8 @@ impl<T> Job<T> {
     /// Waits for the end.
     ///
     /// # Errors
-    /// [`Error::Gone`]: the thread has ended, the MainDevice was stopped meanwhile, or the result was taken before.
+    /// [`Error::Gone`]: the thread has ended, the MainDevice was stopped meanwhile or is INACTIVE now, or the result was
+    /// taken before.
     pub fn wait(self) -> Result<T, Error> {
         let mut state = self.slot.state();
         loop {

@@ -248,6 +248,13 @@ impl<L: Links> MainDevice<L> {
         self.engine.unused_memory(domain)
     }
 
+    /// The same of the memory for process data between both MainDevices
+    /// ([`Declaration::place_partner_data`](crate::Declaration::place_partner_data)).
+    #[cfg(feature = "standby")]
+    pub fn unused_partner_memory(&mut self) -> Option<crate::standby::PartnerMemory> {
+        self.engine.unused_partner_memory()
+    }
+
     pub(crate) fn from_parts(links: L, engine: Engine, acyclic_bytes: usize, of_two: OfTwo) -> MainDevice<L> {
         MainDevice { links, engine, acyclic_bytes, of_two }
     }

@@ -33,9 +33,9 @@ pub use ringcat_engine::event::StandbyEvent;
 pub use ringcat_engine::layout::MasterSizes;
 use ringcat_engine::link::Link;
 pub use ringcat_engine::main_device::{
-    Active, Listener, Options as EngineOptions, PartnerDiagnosis, PartnerStatus, StandbyOptions,
+    Active, Listener, Options as EngineOptions, PartnerDiagnosis, PartnerMemory, PartnerStatus, StandbyOptions,
 };
-pub use ringcat_engine::role::{Partner, RoleCause, RoleControl, RoleRequest};
+pub use ringcat_engine::role::{Partner, Requester, RoleCause, RoleControl, RoleRequest};
 pub use ringcat_engine::standby::{
     ETHERNET_QUEUE, Forwarder, NotForwarded, NotQueued, Onward, PartnerEndpoint, PartnerTraffic,
 };

@@ -298,6 +298,13 @@ impl SupervisorThread {
         self.act(move |engine| engine.unused_memory(domain)).ok().flatten()
     }
 
+    /// The same of the memory for process data between both MainDevices
+    /// ([`Declaration::place_partner_data`](crate::Declaration::place_partner_data)).
+    #[cfg(feature = "standby")]
+    pub fn unused_partner_memory(&self) -> Option<crate::standby::PartnerMemory> {
+        self.act(|engine| engine.unused_partner_memory()).ok().flatten()
+    }
+
     /// Second step, as [`crate::MainDevice::add_junction_connection`].
     ///
     /// # Errors

@@ -24,7 +24,7 @@ use ringcat_sim::host::program::TurnAround;
 use ringcat_sim::network::Network;
 use ringcat_wire::al::{AlState, AlStatus};
 
-use self::board::Board;
+use self::board::{Asked, Board};
 pub use self::board::{Phase, Seen};
 pub use self::member::TIME_OUT_CYCLES;
 use self::outputs::Outputs;
@@ -161,7 +161,13 @@ impl Pair {
     /// Makes the program of a host request a role.
     pub fn request(&mut self, host: Host, request: RoleRequest) {
         self.say(format!("{host:?}: {request:?}"));
-        self.boards[host as usize].ask_for(request);
+        self.boards[host as usize].ask_for(Asked::Role(request));
+    }
+
+    /// Makes the program of a host request permanent standby, with the role INACTIVE.
+    pub fn request_hold(&mut self, host: Host) {
+        self.say(format!("{host:?}: permanent standby"));
+        self.boards[host as usize].ask_for(Asked::Hold);
     }
 
     /// Longest time between outputs that a SubDevice took, since the last call. One that never took any is left out.

@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// Name, arguments, and a part of what it prints at its end.
-const RUN: [(&str, &[&str], &str); 9] = [
+const RUN: [(&str, &[&str], &str); 10] = [
     ("csp_drive", &[], "back at 0, largest following error"),
     ("eni", &[], "outputs Drive.Control word"),
     ("firmware_update", &[], "20012 bytes written\nversion 2.7"),
     ("hops", &["10", "100"], "ns per hop"),
+    ("repeated_transfer", &[], "Second is ACTIVE, and writes the recipe\nSecond: the recipe is written"),
     ("ring_with_a_cut", &[], "ring Open, broken between SubDevice 1 port 1 and SubDevice 2 port 0"),
     ("running_light", &[], "working counter 2 of 2 after 500 cycles"),
     ("sdo_from_another_thread", &[], "SDO 0x7777:00: aborted by the SubDevice: 0x06020000"),

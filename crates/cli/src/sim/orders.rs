@@ -27,6 +27,9 @@ power on A      switch device A on
 hang A          the application of device A hangs, its controller works
 wake A          the application of device A goes on
 outputs A       process data outputs of device A, in hexadecimal
+gaps            by device: longest time between two outputs, changes of the
+                MainDevice that sent them, and how many were older than those
+                before, since the last `gaps`; the first one begins
 inputs A HEX    process data inputs of device A, as far as its application
                 does not set them
 register A R N  N bytes of the controller of device A from register R on, as in
@@ -103,6 +106,7 @@ fn answer(words: &[&str], plant: &mut Plant) -> Result<String, String> {
             let (address, count) = area(address, count)?;
             Ok(hex(plant.network().device(device).controller.register(RegisterAddress(address), count)))
         }
+        ["gaps"] => Ok(plant.gaps()),
         ["clocks"] => Ok(clocks(plant.network())),
         ["inputs", device, bytes] => {
             let device = find_device(device, plant.network())?;

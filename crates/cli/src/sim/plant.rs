@@ -10,6 +10,7 @@ use ringcat::sim::fault::Fault;
 use ringcat::sim::network::Network;
 use ringcat::sim::network::statistics::LossCause;
 
+use super::gaps::Gaps;
 use super::names::describe_cable;
 
 /// A segment under orders.
@@ -20,12 +21,14 @@ pub struct Plant {
     cut: BTreeSet<usize>,
     /// Whether each interface has carrier.
     carrier: [bool; 2],
+    /// Times between outputs, since they were asked for first.
+    gaps: Option<Gaps>,
 }
 
 impl Plant {
     /// A segment whose interfaces all have carrier.
     pub fn new(network: Network) -> Plant {
-        Plant { network, cut: BTreeSet::new(), carrier: [true; 2] }
+        Plant { network, cut: BTreeSet::new(), carrier: [true; 2], gaps: None }
     }
 
     /// The segment.
@@ -81,6 +84,20 @@ impl Plant {
             }
         }
         changed
+    }
+
+    /// Notes the outputs that SubDevices have taken, if times between them were asked for.
+    pub fn note_outputs(&mut self) {
+        if let Some(gaps) = &mut self.gaps {
+            gaps.note(&self.network);
+        }
+    }
+
+    /// Times between outputs since the last call; the first one begins to note them.
+    pub fn gaps(&mut self) -> String {
+        let gaps = self.gaps.get_or_insert_with(|| Gaps::begin(&mut self.network));
+        gaps.note(&self.network);
+        gaps.lines(&self.network)
     }
 
     /// Devices, cut cables and counters.

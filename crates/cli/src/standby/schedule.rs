@@ -104,6 +104,11 @@ impl Schedule {
         step
     }
 
+    /// The hand-over could not be requested: it is due again at once.
+    pub fn again(&mut self, now: Instant) {
+        self.state = State::Waits { due: now };
+    }
+
     fn count(&mut self, step: Option<&Step>) {
         match step {
             Some(Step::Done(time)) => {
@@ -145,6 +150,9 @@ mod tests {
         assert_eq!(step(606, INACTIVE), Some(Step::Done(Duration::from_millis(6))));
         assert_eq!((step(700, INACTIVE), step(900, ACTIVE)), (None, None), "the other one has handed it back");
         assert_eq!(step(1_000, ACTIVE), Some(Step::Request));
+        schedule.again(at(1_000));
+        let request = schedule.step(at(1_002), ACTIVE, READY, (&mut None, None));
+        assert_eq!(request, Some(Step::Request), "another request was pending");
         let Switchovers { done, refused, longest_ns } = schedule.seen();
         assert_eq!((done, refused, longest_ns), (1, 0, Some(6_000_000)));
     }

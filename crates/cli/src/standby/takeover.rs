@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use ringcat::packet::PacketLinks;
 use ringcat::standby::remote::RemoteServer;
-use ringcat::standby::{NotReady, RoleControl, RoleRequest, StandbyOptions};
+use ringcat::standby::{NotReady, Requester, RoleControl, RoleRequest, StandbyOptions};
 use ringcat::{
     AlState, CyclicThread, Instant, LastOutputs, Links, MainDeviceRole, Options, SubDeviceState, SupervisorThread,
 };
@@ -181,7 +181,10 @@ impl Controller<'_> {
         let words = match schedule.step(now(), role, readiness, answers) {
             Some(Step::Request) => {
                 self.events.cause = None;
-                self.control.request(RoleRequest::HandOver);
+                if !self.control.request_as(RoleRequest::HandOver, Requester::Schedule) {
+                    // Another request takes effect first.
+                    return schedule.again(now());
+                }
                 "switchover on schedule: the role is offered".to_owned()
             }
             Some(Step::Done(time)) => {
@@ -189,8 +192,8 @@ impl Controller<'_> {
             }
             Some(Step::Refused(why)) => format!("switchover on schedule REFUSED: {why}"),
             Some(Step::Withdraw) => {
-                // The offer ends, and so does a request that has not taken effect.
-                self.control.request(RoleRequest::Active);
+                // The offer ends, and so does the request if it has not taken effect. Another request ends it as well.
+                let _ = self.control.request_as(RoleRequest::Withdraw, Requester::Schedule);
                 format!("switchover on schedule REFUSED: {NOT_TAKEN}, the offer is withdrawn")
             }
             None => return,

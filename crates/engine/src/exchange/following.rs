@@ -10,9 +10,7 @@ mod cycle;
 mod knowledge;
 mod outputs;
 
-use alloc::boxed::Box;
 use alloc::sync::Arc;
-use alloc::vec;
 
 use ringcat_wire::master_frame::{
     Answer, Area, Fragment, Header, Lengths, MasterFrameError, NotReady, Phase, Stage, fragments_mut, is_master_frame,
@@ -73,8 +71,6 @@ pub(crate) struct Following {
     is_anew: bool,
     /// The answer, without what depends on the cycle.
     pub answer: Answer,
-    /// Process data of this MainDevice for the ACTIVE.
-    pub to_active: Box<[u8]>,
 }
 
 impl Following {
@@ -86,7 +82,6 @@ impl Following {
             whole: Whole { cycle: 0, header: Header::default(), content: Content::new(&lengths), at: Instant::NEVER },
             has_whole: false,
             knowledge: ReceivedKnowledge::default(),
-            to_active: vec![0; lengths.to_active as usize].into_boxed_slice(),
             sender: None,
             newest: None,
             ended: [None; 2],
@@ -156,7 +151,8 @@ impl Following {
     }
 
     /// Takes and fills a received frame of another MainDevice, before it is forwarded. True if it is a master frame.
-    pub fn fill(&mut self, arrived_on: Link, frame: &mut [u8], now: Instant) -> bool {
+    /// `to_active`: process data of this MainDevice for the ACTIVE.
+    pub fn fill(&mut self, arrived_on: Link, frame: &mut [u8], now: Instant, to_active: &[u8]) -> bool {
         if !is_master_frame(frame) {
             return false;
         }
@@ -170,7 +166,7 @@ impl Following {
         let mut cycle = None;
         for fragment in fragments_mut(frame) {
             cycle = cycle.or(Some(fragment.head.cycle));
-            self.take(fragment, arrived_on, sequence, now);
+            self.take(fragment, (arrived_on, sequence), now, to_active);
         }
         if let Some(cycle) = cycle {
             self.complete(cycle, now);
@@ -178,7 +174,13 @@ impl Following {
         true
     }
 
-    fn take(&mut self, mut fragment: Fragment<'_>, arrived_on: Link, sequence: Sequence, now: Instant) {
+    fn take(
+        &mut self,
+        mut fragment: Fragment<'_>,
+        (arrived_on, sequence): (Link, Sequence),
+        now: Instant,
+        to_active: &[u8],
+    ) {
         let head = fragment.head;
         if !self.begin(head.cycle, now) {
             return;
@@ -202,7 +204,7 @@ impl Following {
                 Err(_) => false,
             },
             Area::Answer => answer.is_some_and(|answer| cycle.give_answer(&answer, fragment.data)),
-            Area::ToActive => cycle.give(&self.to_active, head.offset, fragment.data),
+            Area::ToActive => cycle.give(to_active, head.offset, fragment.data),
             // Without its header it may be a piece of other knowledge.
             Area::Knowledge if cycle.header.is_none() => false,
             Area::Knowledge => {

@@ -53,6 +53,8 @@ pub(super) struct Sources<'a> {
     pub domains: &'a [Domain],
     pub counters: &'a CyclicCounters,
     pub ring: RingState,
+    /// Process data for the INACTIVE.
+    pub to_inactive: &'a [u8],
 }
 
 /// The master frames.
@@ -66,13 +68,9 @@ pub(super) struct MasterFrames {
     pub cycle: u32,
     /// Its header.
     pub header: Header,
-    /// Process data for the INACTIVE.
-    pub to_inactive: Box<[u8]>,
-    /// Process data of the INACTIVE, of the last cycle in which all of it came.
-    pub to_active: Box<[u8]>,
-    /// That of the cycle under way.
+    /// Process data of the INACTIVE in the cycle under way.
     coming: Box<[u8]>,
-    /// The cycle of `to_active`.
+    /// The last cycle in which all of it came, while this MainDevice is ACTIVE.
     pub to_active_cycle: Option<u32>,
     /// Frames with areas of the INACTIVE, and those of them that came back filled in this cycle.
     filled: (usize, usize),
@@ -103,8 +101,6 @@ impl MasterFrames {
             domains,
             cycle: 0,
             header: Header { lengths, fragments: number, ..header },
-            to_inactive: zeros(lengths.to_inactive),
-            to_active: zeros(lengths.to_active),
             coming: zeros(lengths.to_active),
             to_active_cycle: None,
             filled: (filled, 0),
@@ -158,7 +154,7 @@ impl MasterFrames {
             }
         }
         self.write_knowledge(sources.words);
-        let (to_inactive, diagnosis) = (&self.to_inactive, &self.diagnosis);
+        let (to_inactive, diagnosis) = (sources.to_inactive, &self.diagnosis);
         for frame in &mut self.frames {
             frame.write_area(Area::ToInactive, to_inactive);
             frame.write_area(Area::Diagnosis, diagnosis);
@@ -261,8 +257,8 @@ impl MasterFrames {
         bytes
     }
 
-    /// Takes a copy that came back.
-    pub fn receive(&mut self, number: usize, copy: FrameCopy, bytes: &[u8]) -> Step {
+    /// Takes a copy that came back. `to_active`: place of the process data of the INACTIVE, as soon as all of it came.
+    pub fn receive(&mut self, number: usize, copy: FrameCopy, bytes: &[u8], to_active: &mut [u8]) -> Step {
         let Some(frame) = self.frames.get_mut(number) else { return Step::Late };
         let was_filled = frame.is_filled();
         let step = frame.receive(copy, bytes);
@@ -272,7 +268,7 @@ impl MasterFrames {
             frame.read_area(bytes, Area::ToActive, &mut self.coming);
             self.filled.1 += usize::from(!was_filled);
             if self.filled.0 == self.filled.1 {
-                self.to_active.copy_from_slice(&self.coming);
+                to_active.copy_from_slice(&self.coming);
                 self.to_active_cycle = Some(self.cycle);
             }
         }
@@ -282,7 +278,7 @@ impl MasterFrames {
     /// No copy is expected any more: the role is INACTIVE.
     pub fn end(&mut self) {
         self.frames.iter_mut().for_each(MasterFrame::close);
-        self.filled.1 = 0;
+        (self.filled.1, self.to_active_cycle) = (0, None);
     }
 }
 

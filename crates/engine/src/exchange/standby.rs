@@ -9,6 +9,7 @@ mod active;
 mod inactive;
 mod pace;
 mod partner;
+mod partner_data;
 mod readiness;
 mod roles;
 pub mod state;
@@ -26,10 +27,12 @@ use crate::domain::DomainId;
 use crate::event::CyclicStandbyEvent;
 use crate::layout::Layout;
 use crate::link::{Link, LinkSet};
+use crate::main_device::PartnerMemory;
 use crate::role::{MainDeviceRole, Partner, RoleControl};
 use crate::time::Instant;
 
 use partner::{Items, PartnerWatch};
+use partner_data::PartnerData;
 use readiness::ReadinessWatch;
 use state::{Offers, Standby, StandbySetup, State};
 
@@ -51,12 +54,16 @@ impl Exchange {
         let mut following = Following::new(planned.lengths, words.clone());
         (following.answer.identity, following.answer.item) = (identity, items.first());
         following.answer.not_ready = NotReady::NO_CYCLE;
+        let mut data = PartnerData::new(&planned.lengths);
+        // The activation has checked its length.
+        let _ = setup.memory.is_some_and(|memory| data.place(memory));
         self.standby = Standby(Some(Box::new(State {
             role: control.role(),
             frames: MasterFrames::new(&self.identity, &planned, header, home_domains(layout)),
             following,
             outputs: OutputsSeen::new(layout),
             watch: PartnerWatch::default(),
+            data,
             readiness: ReadinessWatch::default(),
             items,
             exchanges_from,
@@ -143,27 +150,29 @@ impl Exchange {
         }
     }
 
-    /// Process data for the other MainDevice: what leaves in this role. The bytes of the other direction are left out
-    /// (protocol FR-15).
+    /// Process data for the other MainDevice: what leaves in this role, in the length of its direction (protocol
+    /// FR-15). A change of the role does not change the bytes.
     pub fn to_partner_mut(&mut self) -> &mut [u8] {
-        match self.standby.0.as_deref_mut() {
-            Some(State { role: MainDeviceRole::Active, frames, .. }) => &mut frames.to_inactive,
-            Some(State { role: MainDeviceRole::Inactive, following, .. }) => &mut following.to_active,
-            None => &mut [],
-        }
+        self.standby.0.as_deref_mut().map_or(&mut [], |state| state.data.outgoing_mut(state.role))
     }
 
-    /// Process data of the other MainDevice, of the last cycle in which all of it has arrived; empty before.
+    /// Process data of the other MainDevice, of the last cycle in which all of it has arrived; empty before, also after
+    /// a change of the role.
     pub fn from_partner(&self) -> &[u8] {
-        match self.standby.0.as_deref() {
-            Some(State { role: MainDeviceRole::Active, frames, .. }) if frames.to_active_cycle.is_some() => {
-                &frames.to_active
-            }
-            Some(State { role: MainDeviceRole::Inactive, following, .. }) => {
-                following.whole().map_or(&[], |whole| &whole.content.to_inactive)
-            }
-            Some(_) | None => &[],
-        }
+        let Some(state) = self.standby.0.as_deref() else { return &[] };
+        let has_arrived = match state.role {
+            MainDeviceRole::Active => state.frames.to_active_cycle.is_some(),
+            MainDeviceRole::Inactive => state.shown.is_some() && state.following.whole().is_some(),
+        };
+        if has_arrived { state.data.incoming(state.role) } else { &[] }
+    }
+
+    /// Gives back the memory of the application for process data between both MainDevices
+    /// ([`Declaration::place_partner_data`](crate::main_device::Declaration::place_partner_data)), in the length that
+    /// is used. From then on it is in own memory. Not for the cyclic path: this allocates. `None` where it is in own
+    /// memory.
+    pub fn give_partner_memory_back(&mut self) -> Option<PartnerMemory> {
+        self.standby.0.as_deref_mut()?.data.give_back()
     }
 }
 

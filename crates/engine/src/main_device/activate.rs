@@ -125,6 +125,8 @@ impl MainDevice {
             return Err(ActivateError::LrwWithStandby);
         }
         self.memories.check(&laid_out.layout)?;
+        #[cfg(feature = "standby")]
+        self.check_partner_memory()?;
         Ok(laid_out)
     }
 

@@ -5,6 +5,8 @@ pub(super) mod declare;
 pub(super) mod image_memory;
 pub(super) mod loaded;
 pub(super) mod memories;
+#[cfg(feature = "standby")]
+pub(super) mod partner_memory;
 pub(super) mod register_error;
 pub(super) mod registered;
 pub(super) mod registered_area;
@@ -129,6 +131,9 @@ pub struct Declaration {
     pub clocks: Option<ClockConfig>,
     /// SubDevices that must be present for the activation.
     pub required: Required,
+    /// Memory of the application for process data between two MainDevices.
+    #[cfg(feature = "standby")]
+    pub(in crate::main_device) partner_memory: Option<partner_memory::DeclaredMemory>,
 }
 
 /// SubDevices that must answer, with the expected identity, for an activation. Each other absent SubDevice is reported

@@ -45,6 +45,8 @@ pub(super) struct Standby {
     /// A SubDevice in BOOT, and when it is searched next.
     pub in_boot: Option<MemoryWrite>,
     pub boot_at: Instant,
+    /// Cycles of the application so far, and when there was another one.
+    pub cycles_at: (u64, Instant),
     /// When the knowledge is made next, at the earliest and if nothing has changed.
     pub publish_at: (Instant, Instant),
     /// The knowledge fits into its room.
@@ -99,6 +101,7 @@ impl Standby {
             collision: None,
             in_boot: None,
             boot_at: Instant(0),
+            cycles_at: (0, now),
             publish_at: (Instant(0), Instant(0)),
             fits: true,
             published: None,

@@ -14,6 +14,8 @@ use super::active::Active;
 use super::declaration::Declaration;
 use super::declaration::loaded::{Loaded, closing};
 use super::declaration::memories::Memories;
+#[cfg(feature = "standby")]
+use super::declaration::partner_memory::PartnerMemory;
 use super::pending::Pending;
 use crate::config::{Resolution, data_words, resolve};
 use crate::domain::DomainId;
@@ -53,7 +55,13 @@ impl MainDevice {
     /// Gives back the memory of a declaration that was not activated: after an error in the declaration, or of the
     /// activation.
     pub fn unused_memory(&mut self, domain: DomainId) -> Option<&'static mut [u8]> {
-        self.memories.0.get_mut(domain.0)?.take()
+        self.memories.images.get_mut(domain.0)?.take()
+    }
+
+    /// The same of the memory for process data between both MainDevices ([`Declaration::place_partner_data`]).
+    #[cfg(feature = "standby")]
+    pub fn unused_partner_memory(&mut self) -> Option<PartnerMemory> {
+        self.memories.partner.take()
     }
 
     /// Second step, as often as needed: adds the connection of a local ring. The mode is then strict, whatever the

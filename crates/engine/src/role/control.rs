@@ -1,7 +1,7 @@
 //! The role of a MainDevice, and requests for another one, for all threads (protocol 9.6).
 //!
-//! A request takes effect at the next cycle: the half that runs the cycles takes it, and sets the role. The last
-//! request before a cycle counts.
+//! A request takes effect at the next cycle: the half that runs the cycles takes it, and sets the role. Of several
+//! requests before a cycle the one with the highest priority counts ([`Requester`]), of equal ones the last.
 
 use alloc::sync::Arc;
 use core::fmt;
@@ -20,6 +20,9 @@ pub enum RoleRequest {
     /// ACTIVE, and withdraws an offer of its role without an event, unless it has already sent its last cycle as
     /// ACTIVE.
     Active,
+    /// Only withdraws an offer of the role, as [`RoleRequest::Active`] does. Nothing changes if there is none, or if
+    /// the other MainDevice has accepted it meanwhile.
+    Withdraw,
     /// It becomes INACTIVE with the next cycle, whether or not the other MainDevice takes over.
     Inactive,
     /// It becomes INACTIVE as soon as the other MainDevice goes on in the cycle after: no cycle is lost. While that is
@@ -33,6 +36,7 @@ impl RoleRequest {
             RoleRequest::Active => 1,
             RoleRequest::Inactive => 2,
             RoleRequest::HandOver => 3,
+            RoleRequest::Withdraw => 4,
         }
     }
 
@@ -41,7 +45,32 @@ impl RoleRequest {
             1 => Some(RoleRequest::Active),
             2 => Some(RoleRequest::Inactive),
             3 => Some(RoleRequest::HandOver),
+            4 => Some(RoleRequest::Withdraw),
             _ => None,
+        }
+    }
+}
+
+/// Who requests a role, the lowest priority first. A request replaces one of the same or a lower priority that has not
+/// taken effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum Requester {
+    /// A schedule, which asks again later.
+    Schedule,
+    /// A policy, which decides again with the next cycle.
+    Policy,
+    /// An operator, or the program itself. No other request replaces it.
+    Operator,
+}
+
+impl Requester {
+    /// The bits in a request.
+    const fn bits(self) -> u8 {
+        match self {
+            Requester::Schedule => 0x10,
+            Requester::Policy => 0x20,
+            Requester::Operator => PRIORITY,
         }
     }
 }
@@ -73,8 +102,10 @@ const FORCED: u8 = 0x80;
 /// Bit of a request: permanent standby begins when it takes effect.
 #[cfg(any(test, feature = "standby"))]
 const HOLDS: u8 = 0x40;
+/// Bits of a request: its priority.
+const PRIORITY: u8 = 0x30;
 /// Bits that are no role.
-const MODIFIERS: u8 = 0xC0;
+const MODIFIERS: u8 = 0xF0;
 /// A bit beside the reasons of the application: [`RoleControl::hold`] was called.
 #[cfg(feature = "standby")]
 const HOLD_DECIDED: u16 = 0x8000;
@@ -147,18 +178,29 @@ impl RoleControl {
         self.words.changes.load(Ordering::Acquire)
     }
 
-    /// Requests a role from the next cycle on. It replaces a request that has not taken effect.
+    /// Requests a role from the next cycle on, as [`Requester::Operator`]. It replaces a request that has not taken
+    /// effect.
     ///
     /// While a file is written to a SubDevice (FoE), an EEPROM is written, or a SubDevice is in BOOT, a request that
     /// would take the bus away from the MainDevice that writes is refused and reported as an event.
     pub fn request(&self, request: RoleRequest) {
-        self.words.request.store(request.code(), Ordering::Release);
+        self.words.request.store(request.code() | Requester::Operator.bits(), Ordering::Release);
+    }
+
+    /// As [`RoleControl::request`], for this requester. False if nothing was requested: a request of a higher priority
+    /// has not taken effect yet, or another one came at the same time. Neither waits nor repeats.
+    #[must_use]
+    pub fn request_as(&self, request: RoleRequest, by: Requester) -> bool {
+        let before = self.words.request.load(Ordering::Acquire);
+        let code = request.code() | by.bits();
+        before & PRIORITY <= by.bits()
+            && self.words.request.compare_exchange(before, code, Ordering::AcqRel, Ordering::Relaxed).is_ok()
     }
 
     /// Requests a role from the next cycle on, also if that cuts off a write into the memory of a SubDevice: it may be
     /// destroyed.
     pub fn force(&self, request: RoleRequest) {
-        self.words.request.store(request.code() | FORCED, Ordering::Release);
+        self.words.request.store(request.code() | FORCED | Requester::Operator.bits(), Ordering::Release);
     }
 
     /// The request that has not taken effect yet.
@@ -224,7 +266,8 @@ impl RoleControl {
     #[cfg(feature = "standby")]
     pub fn request_hold(&self, force: bool) {
         let forced = if force { FORCED } else { 0 };
-        self.words.request.store(RoleRequest::Inactive.code() | HOLDS | forced, Ordering::Release);
+        let code = RoleRequest::Inactive.code() | HOLDS | forced | Requester::Operator.bits();
+        self.words.request.store(code, Ordering::Release);
     }
 
     /// Permanent standby as a policy requires, before an application begins; no change if it was decided with
@@ -242,7 +285,7 @@ impl RoleControl {
 
     /// Why a failure of one MainDevice now would cost more than the time-out of a takeover, as this one has seen it in
     /// its last cycle; [`NotReady::NOTHING`] if it would not. As ACTIVE it contains the reasons of the other one and
-    /// its own, as INACTIVE its own.
+    /// its own, as INACTIVE its own. If cycles stop, [`NotReady::STOPPED`] after 100 ms and four periods.
     #[cfg(feature = "standby")]
     pub fn readiness(&self) -> NotReady {
         NotReady(self.words.readiness.load(Ordering::Relaxed))
@@ -293,6 +336,24 @@ mod tests {
         handle.set_not_ready(0x50, true);
         handle.set_not_ready(0x10, false);
         assert_eq!(control.not_ready(), 0x40);
+    }
+
+    // covers: MR-02, standby
+    #[test]
+    fn a_request_is_replaced_by_those_of_the_same_or_a_higher_priority_only() {
+        use Requester::{Operator, Policy, Schedule};
+        let all = [Schedule, Policy, Operator];
+        for (first, second) in all.into_iter().flat_map(|first| all.map(|second| (first, second))) {
+            let control = RoleControl::new(MainDeviceRole::Active);
+            assert!(control.request_as(RoleRequest::HandOver, first));
+            assert_eq!(control.request_as(RoleRequest::Withdraw, second), second >= first, "{first:?}, {second:?}");
+            let expected = if second >= first { RoleRequest::Withdraw } else { RoleRequest::HandOver };
+            assert_eq!(control.requested(), Some(expected), "{first:?}, {second:?}");
+            control.request(RoleRequest::Inactive);
+            assert_eq!(control.requested(), Some(RoleRequest::Inactive));
+            assert!(!control.request_as(RoleRequest::Active, Policy) && control.take_request().is_some());
+            assert!(control.request_as(RoleRequest::Active, Schedule));
+        }
     }
 
     // covers: MR-15, standby

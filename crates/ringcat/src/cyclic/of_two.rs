@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use ringcat_engine::exchange::Exchange;
 use ringcat_engine::link::Link;
+use ringcat_engine::role::Requester;
 use ringcat_engine::time::Instant;
 use ringcat_engine::{Class, class_of};
 
@@ -126,7 +127,8 @@ impl Cyclic {
         if let Some(request) = watch.decide(&situation, now)
             && let Some(control) = exchange.role_control()
         {
-            control.request(request);
+            // It decides again with the next cycle; a request of an operator has priority.
+            let _ = control.request_as(request, Requester::Policy);
         }
     }
 

@@ -7,7 +7,7 @@ use std::time::Duration;
 use ringcat_engine::event::CyclicStandbyEvent;
 use ringcat_engine::link::Link;
 use ringcat_engine::main_device::{ActivateError, Declaration, MainDeviceRole, PartnerStatus};
-use ringcat_engine::role::{RoleControl, RoleRequest};
+use ringcat_engine::role::{Requester, RoleControl, RoleRequest};
 use ringcat_engine::time::Instant;
 use ringcat_engine::{Scan, ScanError};
 
@@ -135,10 +135,14 @@ impl<L: Links> MainDevice<L> {
     /// Becomes ACTIVE without an application, whatever the other MainDevice does: then a scan, or
     /// [`MainDevice::bring_up`], is allowed. If another MainDevice is ACTIVE as well, the one with the lower address
     /// stays ACTIVE ([`OnCollision`](super::OnCollision)). The scan of the one that becomes INACTIVE ends with
-    /// [`ScanError::RoleChanged`]; it listens again with [`Joining`].
-    pub fn become_active(&mut self) {
-        self.role_control().request(RoleRequest::Active);
+    /// [`ScanError::RoleChanged`]; it listens again with [`Joining`]. False if it is not ACTIVE: another role was
+    /// requested meanwhile, which has priority, or the other MainDevice writes into the memory of a SubDevice.
+    pub fn become_active(&mut self) -> bool {
+        let control = self.role_control();
+        // Otherwise the other request takes effect.
+        let _ = control.request_as(RoleRequest::Active, Requester::Policy);
         self.work();
+        control.role() == MainDeviceRole::Active
     }
 
     /// Follows the ACTIVE with an application: nothing is sent before it takes over. `declare` gets what the ACTIVE
@@ -214,16 +218,16 @@ impl<L: Links> MainDevice<L> {
                 Next::Listen if self.partner_status().is_known => self.attend(SLICE),
                 Next::Listen => {}
                 Next::Follow => break self.follow(declare)?,
-                Next::BecomeActive => {
-                    self.become_active();
-                    match self.scan_for_operation() {
-                        Ok(scan) => break self.activate(declare(&scan))?,
-                        Err(Error::Scan(ScanError::RoleChanged)) => {
-                            joining = Joining::on(&self.links, control.clone(), policy);
-                        }
-                        Err(error) => return Err(Box::new(Refused { error, main_device: self })),
-                    }
+                Next::BecomeActive if !self.become_active() => {
+                    joining = Joining::on(&self.links, control.clone(), policy);
                 }
+                Next::BecomeActive => match self.scan_for_operation() {
+                    Ok(scan) => break self.activate(declare(&scan))?,
+                    Err(Error::Scan(ScanError::RoleChanged)) => {
+                        joining = Joining::on(&self.links, control.clone(), policy);
+                    }
+                    Err(error) => return Err(Box::new(Refused { error, main_device: self })),
+                },
             }
         };
         application.set_policy(Some(Policy { takes_over: !control.is_held(), ..*policy }));

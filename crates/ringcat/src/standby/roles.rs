@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ringcat_engine::main_device::{MainDeviceRole, SubDeviceId};
+use ringcat_engine::main_device::{MainDeviceRole, PartnerMemory, SubDeviceId};
 use ringcat_engine::role::{Partner, RoleControl};
 use ringcat_engine::time::Instant;
 
@@ -58,6 +58,14 @@ impl<L: Links, H: AcyclicHalf> Application<L, H> {
         }
     }
 
+    /// Returns the memory that the application gave for process data between both MainDevices
+    /// ([`Declaration::place_partner_data`](crate::Declaration::place_partner_data)), in the length that is used. From
+    /// then on that data is in memory of the library. Not for the cyclic path: this allocates. `None` if it is in
+    /// memory of the library already.
+    pub fn give_partner_memory_back(&mut self) -> Option<PartnerMemory> {
+        self.cyclic.exchange.give_partner_memory_back()
+    }
+
     /// The SubDevices with outputs whose declared watchdog is not longer than the time for which process data may be
     /// missing in a takeover with this policy: each with its watchdog, and with that time. They leave OP during a
     /// takeover. None if this policy does not take over.
@@ -91,12 +99,15 @@ impl ProcessData<'_> {
     }
 
     /// Process data for the other MainDevice, of as many bytes as
-    /// [`StandbyOptions::sizes`](super::StandbyOptions::sizes) says.
+    /// [`StandbyOptions::sizes`](super::StandbyOptions::sizes) says for this role. A change of the role does not change
+    /// them. [`Declaration::place_partner_data`](crate::Declaration::place_partner_data) puts them into memory of the
+    /// application.
     pub fn to_partner_mut(&mut self) -> &mut [u8] {
         self.exchange.to_partner_mut()
     }
 
-    /// Process data of the other MainDevice, of the last cycle in which all of it has arrived; empty before.
+    /// Process data of the other MainDevice, of the last cycle in which all of it has arrived; empty before, also after
+    /// a change of the role.
     pub fn from_partner(&self) -> &[u8] {
         self.exchange.from_partner()
     }

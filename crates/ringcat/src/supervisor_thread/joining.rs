@@ -3,8 +3,8 @@
 
 use std::time::Duration;
 
-use ringcat_engine::main_device::{ActivateError, Active, Declaration, Listener, MainDevice as Engine};
-use ringcat_engine::role::{RoleControl, RoleRequest};
+use ringcat_engine::main_device::{ActivateError, Active, Declaration, Listener, MainDevice as Engine, MainDeviceRole};
+use ringcat_engine::role::{Requester, RoleControl, RoleRequest};
 use ringcat_engine::{Scan, ScanError};
 
 use super::{Activated, Ended, SupervisorThread};
@@ -82,11 +82,14 @@ impl SupervisorThread {
         })
     }
 
-    /// Becomes ACTIVE without an application.
-    fn become_active(&self) -> Result<(), Error> {
+    /// Becomes ACTIVE without an application; false as with
+    /// [`MainDevice::become_active`](crate::MainDevice::become_active).
+    fn become_active(&self) -> Result<bool, Error> {
         self.act(|engine| {
-            engine.role_control().request(RoleRequest::Active);
+            // Otherwise the other request takes effect.
+            let _ = engine.role_control().request_as(RoleRequest::Active, Requester::Policy);
             engine.poll(engine.bus().now());
+            engine.role() == MainDeviceRole::Active
         })
     }
 }
@@ -121,11 +124,14 @@ impl<C: Links> Listening<C> {
                     Err(error) => return Err(self.refused(error)),
                 },
                 Next::BecomeActive => {
-                    let scan = self.supervisor.become_active().and_then(|()| self.supervisor.scan_for_operation());
+                    let scan = self.supervisor.become_active().and_then(|is_active| match is_active {
+                        true => self.supervisor.scan_for_operation().map(Some),
+                        false => Ok(None),
+                    });
                     match scan {
-                        Ok(scan) => return self.supervisor.activate(declare(&scan), self.links),
-                        // Another MainDevice is ACTIVE as well, and stays ACTIVE.
-                        Err(Error::Scan(ScanError::RoleChanged)) => {
+                        Ok(Some(scan)) => return self.supervisor.activate(declare(&scan), self.links),
+                        // Another role was requested, or another MainDevice is ACTIVE as well, and stays ACTIVE.
+                        Ok(None) | Err(Error::Scan(ScanError::RoleChanged)) => {
                             joining = Joining::on(&self.links, control.clone(), policy);
                         }
                         Err(error) => return Err(self.refused(error)),

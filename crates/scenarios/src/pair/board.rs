@@ -71,6 +71,15 @@ impl Seen {
     }
 }
 
+/// What a program is to request before its next cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Asked {
+    /// A role.
+    Role(RoleRequest),
+    /// The role INACTIVE, and permanent standby.
+    Hold,
+}
+
 /// Shared by a program and the test.
 #[derive(Debug, Default)]
 pub struct Board {
@@ -78,7 +87,7 @@ pub struct Board {
     is_asked_to_stop: AtomicBool,
     /// Ethernet frames per cycle.
     frames_per_cycle: AtomicUsize,
-    request: Mutex<Option<RoleRequest>>,
+    request: Mutex<Option<Asked>>,
 }
 
 impl Board {
@@ -98,13 +107,13 @@ impl Board {
         change(&mut self.seen.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
-    /// The program is to request a role.
-    pub fn ask_for(&self, request: RoleRequest) {
+    /// The program is to request something.
+    pub fn ask_for(&self, request: Asked) {
         *self.request.lock().unwrap_or_else(PoisonError::into_inner) = Some(request);
     }
 
     /// Which.
-    pub fn take_request(&self) -> Option<RoleRequest> {
+    pub fn take_request(&self) -> Option<Asked> {
         self.request.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 

@@ -11,7 +11,7 @@ use ringcat::{
 };
 use ringcat_wire::frame::MacAddress;
 
-use super::board::{Board, Phase};
+use super::board::{Asked, Board, Phase};
 use super::programs::{CYCLE, outputs_of};
 use crate::ethernet_peer::EthernetPeer;
 
@@ -102,7 +102,10 @@ fn exchange(links: HostLinks, board: &Board, listen: Duration, policy: Policy) -
     let mut is_running = application.role() == MainDeviceRole::Inactive;
     while !board.is_asked_to_stop() {
         if let Some((request, control)) = board.take_request().zip(application.role_control()) {
-            control.request(request);
+            match request {
+                Asked::Role(request) => control.request(request),
+                Asked::Hold => control.request_hold(false),
+            }
         }
         let shown = application.cycle(|data| {
             let phase = match data.role() {
@@ -145,7 +148,11 @@ fn join(
             Next::BecomeActive => {
                 let now = main_device.now();
                 board.note(|seen| seen.begin(Phase::Starting, now));
-                main_device.become_active();
+                if !main_device.become_active() {
+                    board.note(|seen| seen.begin(Phase::Inactive, now));
+                    joining = Joining::begin(&main_device, policy);
+                    continue;
+                }
                 match main_device.bring_up(declare) {
                     Ok(application) => return Ok(application),
                     Err(refused) if matches!(refused.error, Error::Scan(ScanError::RoleChanged)) => {

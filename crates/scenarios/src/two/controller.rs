@@ -57,6 +57,8 @@ pub struct Controller {
     next_cycle: Instant,
     /// It does nothing.
     pub is_dead: bool,
+    /// Its application runs no cycles; its acyclic half goes on.
+    pub holds_cycles: bool,
     /// Its application writes new outputs: the first byte of each area counts.
     pub writes: bool,
     /// It activates an application after its scan.
@@ -109,6 +111,7 @@ impl Controller {
             forwarder: Forwarder::new(main, redundant),
             next_cycle: Instant::NEVER,
             is_dead: false,
+            holds_cycles: false,
             writes: true,
             activates: true,
             has_scanned: false,
@@ -175,7 +178,7 @@ impl Controller {
             return Instant::NEVER;
         }
         let engine = self.engine.next_deadline().unwrap_or(Instant::NEVER);
-        let cycle = if self.running.is_some() { self.begins_at() } else { Instant::NEVER };
+        let cycle = if self.running.is_some() && !self.holds_cycles { self.begins_at() } else { Instant::NEVER };
         engine.min(cycle)
     }
 
@@ -196,7 +199,7 @@ impl Controller {
         self.receive(network, now, carriers);
         self.work_acyclic(network, now);
         self.advance_start();
-        if self.running.is_some() && self.begins_at() <= now {
+        if self.running.is_some() && !self.holds_cycles && self.begins_at() <= now {
             self.cycle(network, now);
             self.work_acyclic(network, now);
         }

@@ -12,6 +12,7 @@ mod captures;
 mod clocks;
 mod clocks_in_a_ring;
 mod cuts_beside;
+mod deaths;
 #[path = "../../../cli/tests/program/documented.rs"]
 mod documented;
 mod eni;

@@ -33,6 +33,11 @@ impl Running {
         &self.errors
     }
 
+    /// Its process.
+    pub fn process(&self) -> u32 {
+        self.child.id()
+    }
+
     /// Sends a signal, such as `-KILL`.
     pub fn signal(&self, name: &str) {
         send(name, &self.child.id().to_string());

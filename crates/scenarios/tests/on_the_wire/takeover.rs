@@ -25,21 +25,29 @@ pub struct Pair {
     /// The bench.
     pub bench: Bench,
     declared: Vec<String>,
+    role: Vec<String>,
 }
 
 impl Pair {
     /// On interfaces, if the machine allows it.
     pub fn new() -> Option<Pair> {
+        Pair::with_role(&ROLE)
+    }
+
+    /// The same with these options of both controllers.
+    pub fn with_role(role: &[&str]) -> Option<Pair> {
         let mut bench = Bench::new(2)?;
         bench.add_second_main_device();
         bench.simulate(&RING_OF_10.segment(), true);
-        Some(Pair { bench, declared: AUTOMATIC.map(str::to_owned).to_vec() })
+        let role = role.iter().map(|word| (*word).to_owned()).collect();
+        Some(Pair { bench, declared: AUTOMATIC.map(str::to_owned).to_vec(), role })
     }
 
     fn arguments<'a>(&'a self, links: [&'a str; 2], more: &[&'a str]) -> Vec<&'a str> {
         let declared: Vec<&str> = self.declared.iter().map(String::as_str).collect();
+        let role: Vec<&str> = self.role.iter().map(String::as_str).collect();
         let links = ["standby", "--main", links[0], "--redundant", links[1]];
-        [&links[..], &declared, &ROLE, more].concat()
+        [&links[..], &declared, &role, more].concat()
     }
 
     /// Starts the first one.
@@ -59,6 +67,14 @@ impl Pair {
         let second = self.second(more);
         await_words(&first, READY);
         (first, second)
+    }
+
+    /// Switches both interfaces of a controller, the first one or the second one.
+    pub fn switch(&self, host: usize, state: &str) {
+        for name in [["main0", "active1"], ["main1", "second0"]][host] {
+            let arguments = format!("link set {name} {state}");
+            if host == 0 { self.bench.ip_main(&arguments) } else { self.bench.ip_elsewhere(&arguments) }
+        }
     }
 
     /// All SubDevices are in this state.

@@ -88,6 +88,39 @@ fn after_a_takeover_of_33_subdevices_the_first_sdo_is_answered_within_20_ms() {
     assert_eq!(two.controllers[1].engine.subdevices().len(), 33);
 }
 
+// covers: MR-16, MR-18, 9.9, standby
+#[test]
+fn after_a_warm_takeover_of_33_subdevices_the_first_sdo_is_answered_within_200_ms() {
+    let through_init = standby().with_goes_through_init(true);
+    let mut two = Two::in_op(ring_of_two(33, Host::First), declare, through_init);
+    two.run(Duration::from_millis(500));
+    two.kill(0);
+    two.run(3 * CYCLE);
+    two.controllers[1].request(RoleRequest::Active);
+    two.until(Duration::from_secs(1), "it is ACTIVE", |two| two.active() == Some(1));
+    let limits = Limits::new(Duration::from_millis(100), Duration::from_secs(1));
+    let is_read = |two: &mut Two| {
+        let engine = &mut two.controllers[1].engine;
+        let mailbox = engine.mailbox(SubDeviceId(3)).expect("it is declared");
+        let read = async move { coe::read(&mailbox, SdoAddress::new(0x1018, 1), limits, 64).await };
+        let mut pending = engine.start(read);
+        loop {
+            two.run(Duration::from_micros(200));
+            if let Some(result) = pending.take() {
+                return result.is_ok();
+            }
+        }
+    };
+    two.until(Duration::from_secs(1), "it is in INIT", |two| {
+        two.network.device(DeviceIndex(3)).al_status() == AlStatus::new(AlState::Init)
+    });
+    while !is_read(&mut two) {}
+    let first = two.now().since(two.controllers[1].changed_at.expect("it has changed"));
+    println!("first SDO {first:?} after a takeover through INIT");
+    assert!(first <= Duration::from_millis(200), "{first:?}");
+    assert_eq!(two.controllers[1].engine.subdevices().len(), 33, "the topology is known");
+}
+
 // covers: MR-17, REQ042, standby
 #[test]
 fn transfers_of_an_active_that_yields_are_cancelled_and_repeated_at_the_other() {

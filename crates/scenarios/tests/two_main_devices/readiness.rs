@@ -76,3 +76,22 @@ fn both_report_that_they_are_ready_and_each_reason_why_not() {
     let alone = NotReady::ABSENT.with(NotReady::LINK, true);
     assert_eq!((known(&two)[0], reported(&mut two, 0).last()), (alone, Some(&alone)), "{}", two.log());
 }
+
+// covers: standby, MR-15, FR-11
+#[test]
+fn readiness_expires_when_no_cycle_runs() {
+    let mut two = Two::in_op(ring_of_two(4, Host::First), declare, standby());
+    settle(&mut two);
+    assert_eq!(known(&two), [NotReady::NOTHING; 2], "{}", two.log());
+    for number in [1, 0] {
+        two.controllers[number].holds_cycles = true;
+        two.run(Duration::from_millis(80));
+        let readiness = |two: &Two| two.controllers[number].control().readiness();
+        assert_ne!(readiness(&two), NotReady::STOPPED, "it may be late: {number}\n{}", two.log());
+        two.run(Duration::from_millis(80));
+        assert_eq!(readiness(&two), NotReady::STOPPED, "{number}\n{}", two.log());
+        assert_eq!(NotReady::STOPPED.to_string(), "no cycles run");
+        two.controllers[number].holds_cycles = false;
+        two.until(Duration::from_secs(2), "both are ready again", |two| known(two) == [NotReady::NOTHING; 2]);
+    }
+}

@@ -81,11 +81,14 @@ impl NotReady {
     /// Seen by the ACTIVE: the other MainDevice forwards, and does not answer. Never in an answer.
     pub const NO_ANSWER: NotReady = NotReady(0x1000);
 
+    /// Seen by each one itself: its application runs no cycles. Never in an answer.
+    pub const STOPPED: NotReady = NotReady(0x2000);
+
     /// Reasons that do not prevent a takeover.
     const MINOR: u16 = NotReady::LINK.0 | NotReady::GUARD.0 | NotReady::WATCHDOG.0;
 
     /// Names of the bits.
-    const NAMES: [(NotReady, &str); 13] = [
+    const NAMES: [(NotReady, &str); 14] = [
         (NotReady::NO_APPLICATION, "no application"),
         (NotReady::NO_CYCLE, "no whole cycle of master frames"),
         (NotReady::IDENTITY, "another configuration"),
@@ -99,6 +102,7 @@ impl NotReady {
         (NotReady::VERSION, "master frames of another version"),
         (NotReady::ABSENT, "the other MainDevice is absent"),
         (NotReady::NO_ANSWER, "the other MainDevice forwards, and does not follow"),
+        (NotReady::STOPPED, "no cycles run"),
     ];
 
     /// These bits and others.

@@ -43,7 +43,8 @@ impl Exchange {
         header.write = state.words.write();
         let (board, domains, counters) = (&*self.board, &self.domains[..], &self.tally.counters);
         let ring = self.evidence.monitor.state();
-        state.frames.load(&Sources { board, words: &state.words, domains, counters, ring });
+        let to_inactive = state.data.outgoing(state.role);
+        state.frames.load(&Sources { board, words: &state.words, domains, counters, ring, to_inactive });
         let (sequence, by_id) = (&mut self.sequence, &mut self.by_id);
         let next = |number: usize| {
             *sequence = sequence.next();
@@ -68,7 +69,7 @@ impl Exchange {
         if number >= state.frames.count() {
             return None;
         }
-        Some(match state.frames.receive(number, copy, bytes) {
+        Some(match state.frames.receive(number, copy, bytes, state.data.incoming_mut(MainDeviceRole::Active)) {
             Step::Waiting => {
                 self.board.traffic.post_half_home(copy.sent_on, copy.sequence);
                 Received::Taken

@@ -28,7 +28,7 @@ impl Exchange {
             && state.role == MainDeviceRole::Inactive
         {
             state.words.post_partner_frame(now);
-            state.following.fill(arrived_on, frame, now);
+            state.following.fill(arrived_on, frame, now, state.data.outgoing(MainDeviceRole::Inactive));
             if state.following.take_anew() {
                 state.outputs.forget();
             }
@@ -130,6 +130,8 @@ impl State {
                 to.copy_from_slice(from);
             }
         }
+        let from_partner = self.data.incoming_mut(MainDeviceRole::Inactive);
+        from_partner.iter_mut().zip(&whole.content.to_inactive).for_each(|(to, from)| *to = *from);
         let records = whole.content.diagnosis.get(Diagnosis::LEN..).unwrap_or_default();
         let has_inputs = !self.runs.is_empty();
         let is_fresh = |subdevice: usize| has_inputs && record(&whole.content.subdevices, subdevice).is_fresh();

@@ -45,7 +45,7 @@ impl Exchange {
             MainDeviceRole::Active => {
                 match request {
                     Some(RoleRequest::HandOver) => state.begin_offer(&mut self.events),
-                    Some(RoleRequest::Active) => state.withdraw_offer(),
+                    Some(RoleRequest::Active | RoleRequest::Withdraw) => state.withdraw_offer(),
                     Some(RoleRequest::Inactive) | None => {}
                 }
                 let is_down = |link: &Link| self.board.live.carrier(*link) == Some(false);
@@ -54,13 +54,13 @@ impl Exchange {
                     _ if state.frames.header.phase == Phase::Ends => Change::ToInactive(RoleCause::HandedOver),
                     Some(RoleRequest::Inactive) => Change::ToInactive(RoleCause::Requested),
                     _ if is_alone => Change::ToInactive(RoleCause::LinksLost),
-                    Some(RoleRequest::Active | RoleRequest::HandOver) | None => Change::None,
+                    Some(RoleRequest::Active | RoleRequest::Withdraw | RoleRequest::HandOver) | None => Change::None,
                 }
             }
             MainDeviceRole::Inactive => match request {
                 _ if state.is_handed_over(now) => Change::ToActive(RoleCause::HandedOver),
                 Some(RoleRequest::Active) => Change::ToActive(RoleCause::Requested),
-                Some(RoleRequest::Inactive | RoleRequest::HandOver) | None => Change::None,
+                Some(RoleRequest::Inactive | RoleRequest::HandOver | RoleRequest::Withdraw) | None => Change::None,
             },
         };
         state.begun_at = now;
@@ -168,6 +168,7 @@ impl State {
             (MainDeviceRole::Active, RoleRequest::Inactive | RoleRequest::HandOver) => self.words.write(),
             (MainDeviceRole::Inactive, RoleRequest::Active) => self.words.partner_write(now),
             (MainDeviceRole::Active, RoleRequest::Active)
+            | (_, RoleRequest::Withdraw)
             | (MainDeviceRole::Inactive, RoleRequest::Inactive | RoleRequest::HandOver) => None,
         };
         let Some(write) = write else {

@@ -7,16 +7,18 @@ use ringcat_wire::frame::MacAddress;
 use ringcat_wire::memory_write::MemoryWrite;
 
 use super::partner::{Items, PartnerWatch};
+use super::partner_data::PartnerData;
 use super::readiness::ReadinessWatch;
 use crate::board::standby::StandbyWords;
 use crate::exchange::following::{Following, OutputsSeen};
 use crate::exchange::master_frames::MasterFrames;
 use crate::layout::{InputRun, PlannedMasterFrames};
+use crate::main_device::PartnerMemory;
 use crate::role::{MainDeviceRole, RoleControl};
 use crate::time::Instant;
 
 /// Data for MainDevice redundancy.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct StandbySetup {
     /// The master frames.
     pub planned: PlannedMasterFrames,
@@ -36,6 +38,8 @@ pub struct StandbySetup {
     pub control: RoleControl,
     /// Words for the acyclic half.
     pub words: Arc<StandbyWords>,
+    /// Memory of the application for process data between both.
+    pub memory: Option<PartnerMemory>,
 }
 
 /// Whether the role may be offered to the other MainDevice.
@@ -62,6 +66,8 @@ pub(in crate::exchange) struct State {
     pub following: Following,
     pub outputs: OutputsSeen,
     pub watch: PartnerWatch,
+    /// Process data between both.
+    pub data: PartnerData,
     pub readiness: ReadinessWatch,
     pub items: Items,
     pub exchanges_from: Arc<[u8]>,

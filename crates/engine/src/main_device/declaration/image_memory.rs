@@ -1,9 +1,9 @@
-//! Memory of the application for the image of a domain.
+//! Memory of the application for the image of a domain, or for process data of the other MainDevice.
 
 use alloc::sync::Arc;
 use core::fmt;
 
-/// Memory for the image of a domain. Copies of a declaration share it; one of them can be activated, after the others
+/// Memory of the application. Copies of a declaration share it; one of them can be activated, after the others
 /// are dropped.
 #[derive(Clone)]
 pub struct ImageMemory(Arc<Memory>);
@@ -18,7 +18,7 @@ impl fmt::Debug for ImageMemory {
 }
 
 impl ImageMemory {
-    /// Memory that is at least as long as the image.
+    /// Memory that is at least as long as what it is for.
     pub fn new(memory: &'static mut [u8]) -> ImageMemory {
         ImageMemory(Arc::new(Memory(memory)))
     }

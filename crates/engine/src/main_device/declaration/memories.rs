@@ -1,4 +1,4 @@
-//! Memory of the application for the images of domains: declared with the domain, used from the activation on.
+//! Memory of the application for the images of domains, and for process data between two MainDevices: declared with the domain, used from the activation on.
 //!
 //! The memory outlives the application: it is valid before the activation and after the end. Another process may map
 //! it, or a C program may own it.
@@ -6,6 +6,8 @@
 use alloc::vec::Vec;
 
 use super::image_memory::ImageMemory;
+#[cfg(feature = "standby")]
+use super::partner_memory::PartnerMemory;
 use crate::domain::DomainId;
 use crate::layout::Layout;
 use crate::main_device::activate::activate_error::ActivateError;
@@ -35,9 +37,15 @@ impl Declaration {
     }
 }
 
-/// Memory of each domain of a loaded declaration.
+/// Memory of a loaded declaration.
 #[derive(Debug, Default)]
-pub(in crate::main_device) struct Memories(pub Vec<Option<&'static mut [u8]>>);
+pub(in crate::main_device) struct Memories {
+    /// By domain.
+    pub images: Vec<Option<&'static mut [u8]>>,
+    /// For process data between both.
+    #[cfg(feature = "standby")]
+    pub partner: Option<PartnerMemory>,
+}
 
 impl Memories {
     /// Takes the memory out of a declaration.
@@ -50,8 +58,14 @@ impl Memories {
         if let Some(domain) = shared {
             return Err(ActivateError::MemoryShared { domain: DomainId(domain) });
         }
+        #[cfg(feature = "standby")]
+        let partner = declaration.take_partner_memory()?;
         let taken = declaration.domains.iter_mut().map(|domain| domain.memory.take()?.into_inner());
-        Ok(Memories(taken.collect()))
+        Ok(Memories {
+            images: taken.collect(),
+            #[cfg(feature = "standby")]
+            partner,
+        })
     }
 
     /// Checks that each image fits.
@@ -59,7 +73,7 @@ impl Memories {
     /// # Errors
     /// Memory is shorter than the image of its domain.
     pub fn check(&self, layout: &Layout) -> Result<(), ActivateError> {
-        for (domain, (memory, planned)) in self.0.iter().zip(&layout.domains).enumerate() {
+        for (domain, (memory, planned)) in self.images.iter().zip(&layout.domains).enumerate() {
             let needed = planned.image_len as usize;
             if let Some(got) = memory.as_ref().map(|memory| memory.len()).filter(|got| *got < needed) {
                 return Err(ActivateError::MemoryTooShort { domain: DomainId(domain), needed, got });
@@ -68,9 +82,20 @@ impl Memories {
         Ok(())
     }
 
-    /// Takes all memory.
+    /// Checks that process data between both MainDevices fits, of which the longer direction has this many bytes.
+    ///
+    /// # Errors
+    /// One of both memories is shorter.
+    #[cfg(feature = "standby")]
+    pub fn check_partner(&self, needed: usize) -> Result<(), ActivateError> {
+        let Some(PartnerMemory { to_partner, from_partner }) = &self.partner else { return Ok(()) };
+        let got = to_partner.len().min(from_partner.len());
+        if got < needed { Err(ActivateError::PartnerMemoryTooShort { needed, got }) } else { Ok(()) }
+    }
+
+    /// Takes the memory of all images.
     pub fn take(&mut self) -> impl Iterator<Item = (DomainId, &'static mut [u8])> + use<> {
-        let all = core::mem::take(&mut self.0).into_iter().enumerate();
+        let all = core::mem::take(&mut self.images).into_iter().enumerate();
         all.filter_map(|(domain, memory)| Some((DomainId(domain), memory?)))
     }
 }

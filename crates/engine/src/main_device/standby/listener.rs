@@ -60,7 +60,7 @@ impl Listener {
     /// allocates nor waits.
     pub fn fill(&mut self, arrived_on: Link, frame: &mut [u8], now: Instant) {
         self.words.post_partner_frame(now);
-        self.listening.fill(arrived_on, frame, now);
+        self.listening.fill(arrived_on, frame, now, &[]);
         let unreadable = match self.listening.unusable {
             Some(Unusable::Version { least, got }) => {
                 self.words.post_other_version(least, got);

@@ -17,6 +17,7 @@ use crate::knowledge::Knowledge;
 use crate::layout::{Layout, LayoutError, LrwPolicy, PlannedMasterFrames};
 use crate::link::LinkSet;
 use crate::main_device::MainDevice;
+use crate::main_device::activate::activate_error::ActivateError;
 use crate::main_device::activate::prepare::watchdog_of;
 use crate::main_device::declaration::Declaration;
 use crate::main_device::standby::Marks;
@@ -46,6 +47,15 @@ impl MainDevice {
         self.standby.is_some() && lrw == LrwPolicy::PerSubDevice
     }
 
+    /// Checks memory of the application for process data between both MainDevices.
+    pub(in crate::main_device) fn check_partner_memory(&self) -> Result<(), ActivateError> {
+        let Some(standby) = self.standby.as_ref().filter(|_| self.options.links() == LinkSet::Ring) else {
+            return Ok(());
+        };
+        let sizes = standby.options.sizes;
+        self.memories.check_partner(sizes.to_inactive.max(sizes.to_active).into())
+    }
+
     /// Sets up the exchange for a ring of two MainDevices.
     pub(in crate::main_device) fn set_up_standby(
         &mut self,
@@ -62,6 +72,7 @@ impl MainDevice {
         let planned = PlannedMasterFrames::new(standby.options.sizes, layout, subdevices.member_count())?;
         planned.check_time(layout, if standby.options.max_acyclic > 0 { MAX_FRAME } else { 0 })?;
         (standby.configuration, standby.session) = (configuration, Some(session));
+        standby.cycles_at = (0, self.supervisor.bus().now());
         (standby.publish_at, standby.published) = ((Instant(0), Instant(0)), None);
         let lowest = |is_op_only: bool| if is_op_only { AlState::Op } else { AlState::SafeOp };
         let exchanges_from: Vec<u8> = subdevices
@@ -80,6 +91,7 @@ impl MainDevice {
                 goes_through_init: standby.options.goes_through_init,
                 control: self.roles.clone(),
                 words: standby.words.clone(),
+                memory: self.memories.partner.take(),
             },
         );
         Ok(())

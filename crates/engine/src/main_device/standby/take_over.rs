@@ -8,6 +8,7 @@ use core::time::Duration;
 
 use ringcat_wire::al::AlState;
 use ringcat_wire::frame::MacAddress;
+use ringcat_wire::master_frame::NotReady;
 use ringcat_wire::memory_write::{MemoryWrite, WriteKind};
 
 use crate::board::live::{Life, Presence};
@@ -31,6 +32,9 @@ use crate::time::Instant;
 
 /// After this time without frames of another ACTIVE, the next one is a new collision.
 const COLLISIONS_APART: Duration = Duration::from_millis(100);
+/// Readiness expires after this time and this number of periods without a cycle.
+const STOPPED_AFTER: Duration = Duration::from_millis(100);
+const STOPPED_CYCLES: u32 = 4;
 /// Interval at which SubDevices in BOOT are searched.
 const BOOT_EACH: Duration = Duration::from_millis(10);
 
@@ -55,8 +59,30 @@ impl MainDevice {
             }
             self.supervisor.poll(now);
         }
+        self.watch_cycles(now);
         self.post_memory_write(now);
         self.publish_knowledge(now);
+    }
+
+    /// Readiness is determined in cycles: without any, for some time, it says so.
+    fn watch_cycles(&mut self, now: Instant) {
+        let running = self.active().map(|segment| {
+            let view = segment.view();
+            let period = view.layout().home().map_or(Duration::ZERO, |home| view.layout().domains[home].period);
+            (segment.board.cycles(), STOPPED_AFTER + STOPPED_CYCLES * period)
+        });
+        let Some(standby) = &mut self.standby else { return };
+        let Some((cycles, limit)) = running else {
+            if !self.roles.readiness().has(NotReady::NO_APPLICATION) {
+                self.roles.post_readiness(NotReady::NO_APPLICATION);
+            }
+            return;
+        };
+        if standby.cycles_at.0 != cycles {
+            standby.cycles_at = (cycles, now);
+        } else if now.since(standby.cycles_at.1) >= limit {
+            self.roles.post_readiness(NotReady::STOPPED);
+        }
     }
 
     /// Posts a write into the memory of a SubDevice that is under way: the role is not given up meanwhile.
@@ -103,6 +129,8 @@ impl MainDevice {
         let role = match request {
             RoleRequest::Active => MainDeviceRole::Active,
             RoleRequest::Inactive => MainDeviceRole::Inactive,
+            // Without an application nothing is offered.
+            RoleRequest::Withdraw => return,
             RoleRequest::HandOver => {
                 let event = Event::Standby(StandbyEvent::HandOverRefused(Partner::Absent));
                 return self.supervisor.append_event(now, event);

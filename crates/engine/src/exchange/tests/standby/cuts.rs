@@ -44,7 +44,6 @@ fn in_each_row_of_a_cut_one_copy_counts_as_expected_and_none_more() {
             duo.second.exchange.to_partner_mut().fill(0x80 + round);
             duo.now += super::duo::PERIOD;
             duo.first.exchange.begin_role(duo.now);
-            duo.second.exchange.begin_role(duo.now);
             duo.first.exchange.process(DOMAIN, duo.now);
             duo.first.exchange.queue(DOMAIN, duo.now);
             let mut sent = std::vec::Vec::new();
@@ -61,6 +60,7 @@ fn in_each_row_of_a_cut_one_copy_counts_as_expected_and_none_more() {
                 }
                 duo.first.exchange.receive(back, &frame, duo.now);
             }
+            duo.second.exchange.begin_role(duo.now);
             assert_eq!(duo.first.exchange.from_partner(), [0x80 + round; 3], "{row}");
             assert_eq!(duo.second.exchange.from_partner(), [round; 3], "{row}");
         }

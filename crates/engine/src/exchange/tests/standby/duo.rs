@@ -65,6 +65,7 @@ impl Device {
             goes_through_init: false,
             control: control.clone(),
             words: words.clone(),
+            memory: None,
         };
         exchange.set_up_standby(&layout, setup);
         Device { exchange, board, words, control, events }
