@@ -114,6 +114,58 @@ fn the_archive_works_inside_another_shared_object_and_beside_another_rust_librar
     }
 }
 
+/// All files below a directory.
+fn files_below(place: &Path) -> BTreeSet<String> {
+    let (mut files, mut directories) = (BTreeSet::new(), vec![place.to_owned()]);
+    while let Some(directory) = directories.pop() {
+        for entry in std::fs::read_dir(&directory).into_iter().flatten().flatten() {
+            let (path, kind) = (entry.path(), entry.file_type().expect("it is there"));
+            if kind.is_dir() {
+                directories.push(path);
+            } else {
+                files.insert(path.strip_prefix(place).expect("below it").to_str().expect("it is text").to_owned());
+            }
+        }
+    }
+    files
+}
+
+// covers: c-interface
+#[test]
+fn an_uninstall_removes_what_was_installed_and_keeps_what_was_changed() {
+    let place = target("removed");
+    let _ = std::fs::remove_dir_all(&place);
+    let (other, old) = (place.join("opt/etherlab/lib/libother.so"), "opt/etherlab/lib/libethercat.old");
+    std::fs::create_dir_all(other.parent().expect("a directory")).expect("it can be made");
+    std::fs::write(&other, "of another program").expect("it can be written");
+    if installed_below(&place, "/opt/etherlab").is_none() {
+        return;
+    }
+    let list = place.join("opt/etherlab/share/ringcat/installed-library");
+    let text = std::fs::read_to_string(&list).expect("it is there");
+    let listed = text.lines().filter(|line| !line.starts_with("d ")).count();
+    assert_eq!(listed + 2, files_below(&place).len(), "all but the list and another's file:\n{text}");
+    // A file of an older version, whose sum `cksum` prints for nothing.
+    std::fs::write(place.join(old), "").expect("it can be written");
+    std::fs::write(&list, format!("{text}f library /{old} 4294967295 0\n")).expect("it can be written");
+    assert!(installed_below(&place, "/opt/etherlab").is_some() && !place.join(old).exists());
+    assert_eq!(std::fs::read_to_string(&list).expect("it is there"), text);
+    let changed = place.join("opt/etherlab/include/ecrt.h");
+    std::fs::write(&changed, "/* changed */").expect("it can be written");
+    let removal = || {
+        let mut removal = Command::new(here().join("install"));
+        removal.args(["--uninstall", "--prefix", "/opt/etherlab", "--destdir"]).arg(&place);
+        removal
+    };
+    let said = run(&mut removal());
+    assert!(said.contains("kept, because it was changed: ") && said.contains("include/ecrt.h\n"), "{said}");
+    let left = ["opt/etherlab/include/ecrt.h", "opt/etherlab/lib/libother.so"].map(String::from);
+    assert_eq!(files_below(&place), BTreeSet::from(left));
+    assert!(!place.join("opt/etherlab/lib/cmake").exists() && !place.join("opt/etherlab/share").exists());
+    let again = removal().output().expect("sh is there");
+    assert!(!again.status.success() && String::from_utf8_lossy(&again.stderr).contains("nothing is installed here"));
+}
+
 /// The parts of the manual's layout (7.2.1) that a library has: bin, sbin and etc belong to the tool and its service.
 // covers: c-interface
 #[test]
@@ -163,6 +215,7 @@ fn the_prefix_of_the_manual_has_its_layout_and_no_file_names_the_build() {
         "lib/libfakeethercat.so.1",
         "lib/libfakeethercat.so.1.2.0",
         "lib/pkgconfig/libethercat.pc",
+        "share/ringcat/installed-library",
     ];
     assert_eq!(found, expected.map(|path| format!("opt/etherlab/{path}")));
     let pc = std::fs::read_to_string(place.join("opt/etherlab/lib/pkgconfig/libethercat.pc")).expect("it is there");

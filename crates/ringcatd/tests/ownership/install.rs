@@ -208,6 +208,36 @@ fn a_prefix_with_files_of_another_master_is_refused_and_stays_as_it_is() {
 
 // covers: daemon
 #[test]
+fn an_edited_script_of_the_prefix_is_kept_and_the_new_one_is_beside_it() {
+    let root = Root::new();
+    let prefix = ["--prefix", "/opt/etherlab"];
+    root.install(&prefix);
+    let script = "/opt/etherlab/etc/init.d/ethercat";
+    let (new, list) = (format!("{script}.new"), "/opt/etherlab/share/ringcat/installed");
+    // An installation of a version before this one had it as a file, and had another text.
+    let others: Vec<String> = root.text(list).lines().filter(|it| !it.contains(script)).map(String::from).collect();
+    root.write(list, &format!("{}\nf service {script} 4294967295 0\n", others.join("\n")));
+    root.write(script, "");
+    root.install(&prefix);
+    assert!(root.text(script).contains("ethercatctl") && !root.path(&new).exists());
+    let edited = format!("{}# edited\n", root.text(script));
+    root.write(script, &edited);
+    for _ in 0..2 {
+        let about = root.install(&prefix);
+        assert!(about.contains(&format!("kept, because it was edited: {}", root.path(script).display())), "{about}");
+        assert_eq!((root.text(script), root.path(&new).exists()), (edited.clone(), true));
+    }
+    // Also where it was kept by a removal.
+    said(&root.run(&["--prefix", "/opt/etherlab", "--uninstall"]), true);
+    assert_eq!(root.files(), BTreeSet::from([script, list].map(String::from)));
+    root.install(&prefix);
+    assert_eq!((root.text(script), root.path(&new).exists()), (edited, true));
+    said(&root.run(&["--prefix", "/opt/etherlab", "--uninstall", "--purge"]), true);
+    assert!(root.is_empty(), "{:?}", root.files());
+}
+
+// covers: daemon
+#[test]
 fn each_directory_can_be_chosen() {
     let root = Root::new();
     let places = [
