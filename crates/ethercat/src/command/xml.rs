@@ -53,11 +53,8 @@ fn info(slave: &Slave, details: &Description) -> String {
     let mut text = format!("<EtherCATInfo>\n  <!-- Slave {} -->\n", slave.line.position);
     append!(text, "  <Vendor>\n    <Id>{vendor}</Id>\n  </Vendor>\n");
     text += "  <Descriptions>\n    <Devices>\n      <Device>\n";
-    append!(text, "        <Type ProductCode=\"#x{product:08x}\" RevisionNo=\"#x{revision:08x}\"");
-    text += &match slave.line.order.as_str() {
-        "" => "/>\n".to_owned(),
-        order => format!(">{}</Type>\n", escaped(order)),
-    };
+    append!(text, "        <Type ProductCode=\"#x{product:08x}\" RevisionNo=\"#x{revision:08x}\">");
+    append!(text, "{}</Type>\n", escaped(&slave.line.order));
     if !slave.line.name.is_empty() {
         append!(text, "        <Name><![CDATA[{}]]></Name>\n", character_data(&slave.line.name));
     }

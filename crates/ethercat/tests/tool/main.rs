@@ -1,6 +1,6 @@
 //! The tool beside a daemon and an application, on simulated segments.
 //!
-//! `golden` compares with outputs of the original tool, where they are there; all others have the expected text here.
+//! `golden` and `real_outputs` compare with outputs of the original tool, where they are there; all others have the expected text here.
 
 mod bench;
 mod beside;
@@ -13,6 +13,9 @@ mod idle;
 mod json;
 mod operation;
 mod outputs;
+mod real_bus;
+mod real_outputs;
+mod real_xml;
 mod record;
 mod ring_and_clocks;
 mod several;

@@ -46,6 +46,8 @@ pub struct Entry {
     default: Option<Vec<u8>>,
     /// Bits of the value, if they are neither those of the type nor those of all its bytes.
     bits: Option<u16>,
+    /// Data type and access rights of SDO information, if they are not those of `data_type` and `access`.
+    stated: Option<(DataType, AccessRights)>,
 }
 
 impl Entry {
@@ -65,6 +67,7 @@ impl Entry {
             unit: None,
             default,
             bits: None,
+            stated: None,
         }
     }
 
@@ -86,6 +89,12 @@ impl Entry {
     /// The same entry with this number of bits, for example 3 for an enumeration in a byte; 0: not stated.
     pub fn of_bits(self, bits: u16) -> Entry {
         Entry { bits: Some(bits).filter(|bits| *bits != 0), ..self }
+    }
+
+    /// The same entry with this data type and these bits of [`AccessRights`] in SDO information, as devices state them:
+    /// types of their own, no rights at all.
+    pub fn stated(self, data_type: u16, rights: u16) -> Entry {
+        Entry { stated: Some((DataType(data_type), AccessRights(rights))), ..self }
     }
 
     /// The same entry as a number that can only be written within this range.
@@ -110,7 +119,7 @@ impl Entry {
 
     /// Data type.
     pub fn data_type(&self) -> DataType {
-        DataType(self.data_type.into())
+        self.stated.map_or(DataType(self.data_type.into()), |(data_type, _)| data_type)
     }
 
     /// Length of the value in bits; 0 if it varies (domains) or exceeds the field in SDO information.
@@ -130,7 +139,7 @@ impl Entry {
             Access::ReadWritePreOp => AccessRights::READ | AccessRights::WRITE_PREOP,
             Access::WriteOnly => AccessRights::WRITE,
         };
-        AccessRights(by_access | self.more_rights)
+        self.stated.map_or(AccessRights(by_access | self.more_rights), |(_, rights)| rights)
     }
 
     /// Default value, if it has the length of the type.
