@@ -1,6 +1,7 @@
 //! The tool beside a daemon and an application, on simulated segments.
 //!
-//! `golden` and `real_outputs` compare with outputs of the original tool, where they are there; all others have the expected text here.
+//! `golden` and `real_outputs` compare with outputs of the original tool, where they are there; all others have
+//! the expected text here.
 
 mod bench;
 mod beside;
