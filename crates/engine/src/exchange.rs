@@ -58,6 +58,8 @@ pub use domain::Domain;
 pub use entry::Entry;
 pub use foreign::ForeignFrame;
 #[cfg(feature = "standby")]
+pub use standby::PartnerMemory;
+#[cfg(feature = "standby")]
 pub use standby::state::StandbySetup;
 
 use crate::board::Board;

@@ -45,7 +45,7 @@ pub use active::Active;
 pub use declaration::areas::{AreaEntries, Directory, ObjectOf, PlacedEntry};
 pub use declaration::image_memory::ImageMemory;
 #[cfg(feature = "standby")]
-pub use declaration::partner_memory::PartnerMemory;
+pub use declaration::partner_memory::PartnerMemoryError;
 pub use declaration::register_error::RegisterError;
 pub use declaration::registered_area::{EntryPlace, RegisteredArea};
 pub use declaration::{Declaration, DeclaredGroup, DomainConfig, DomainMember, ExplicitLrw, MAX_UNDER_WAY, Required};

@@ -147,8 +147,8 @@ impl<T> Job<T> {
     /// Waits for the end.
     ///
     /// # Errors
-    /// [`Error::Gone`]: the thread has ended, the MainDevice was stopped meanwhile or is INACTIVE now, or the result was
-    /// taken before.
+    /// [`Error::Gone`]: the thread has ended, the MainDevice was stopped meanwhile or is INACTIVE now, or the result
+    /// was taken before.
     pub fn wait(self) -> Result<T, Error> {
         let mut state = self.slot.state();
         loop {

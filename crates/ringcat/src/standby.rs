@@ -30,10 +30,11 @@ use std::fmt;
 use std::time::Duration;
 
 pub use ringcat_engine::event::StandbyEvent;
+pub use ringcat_engine::exchange::PartnerMemory;
 pub use ringcat_engine::layout::MasterSizes;
 use ringcat_engine::link::Link;
 pub use ringcat_engine::main_device::{
-    Active, Listener, Options as EngineOptions, PartnerDiagnosis, PartnerMemory, PartnerStatus, StandbyOptions,
+    Active, Listener, Options as EngineOptions, PartnerDiagnosis, PartnerMemoryError, PartnerStatus, StandbyOptions,
 };
 pub use ringcat_engine::role::{Partner, Requester, RoleCause, RoleControl, RoleRequest};
 pub use ringcat_engine::standby::{

@@ -13,6 +13,7 @@ const ALLOWED: &[(&str, &str)] = &[
     ("crates/scenarios/src/counting_allocator.rs", "a global allocator that counts allocations of the cyclic path"),
     ("crates/scenarios/src/shared_memory.rs", "maps memory that two processes share"),
     ("crates/scenarios/src/bin/forward/bare.rs", "system calls alone: what the forwarder is compared with"),
+    ("crates/scenarios/tests/on_the_wire/deaths/stopped_thread.rs", "traces a thread of a process, so that it hangs"),
     ("ci/no-std-proof/src/", "a program without std brings its own start and allocator"),
 ];
 

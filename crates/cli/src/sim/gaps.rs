@@ -103,7 +103,7 @@ mod tests {
         }
     }
 
-    // covers: simulator
+    // covers: sim-interfaces
     #[test]
     fn gaps_changes_of_the_sender_and_older_outputs_are_counted() {
         let mut taken = Taken::default();

@@ -27,9 +27,10 @@ use crate::domain::DomainId;
 use crate::event::CyclicStandbyEvent;
 use crate::layout::Layout;
 use crate::link::{Link, LinkSet};
-use crate::main_device::PartnerMemory;
 use crate::role::{MainDeviceRole, Partner, RoleControl};
 use crate::time::Instant;
+
+pub use partner_data::PartnerMemory;
 
 use partner::{Items, PartnerWatch};
 use partner_data::PartnerData;

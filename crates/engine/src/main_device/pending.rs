@@ -65,8 +65,8 @@ impl<T> Pending<T> {
         self.slot.signal.until(|| self.slot.result.borrow_mut().take()).await
     }
 
-    /// Whether the procedure runs. A procedure that was ended by a stop of the MainDevice, or because another MainDevice
-    /// has the role ACTIVE now, has no result.
+    /// Whether the procedure runs. A procedure that was ended by a stop of the MainDevice, or because it is INACTIVE
+    /// now, has no result.
     pub fn is_running(&self) -> bool {
         self.running.get()
     }

@@ -14,11 +14,11 @@ use super::active::Active;
 use super::declaration::Declaration;
 use super::declaration::loaded::{Loaded, closing};
 use super::declaration::memories::Memories;
-#[cfg(feature = "standby")]
-use super::declaration::partner_memory::PartnerMemory;
 use super::pending::Pending;
 use crate::config::{Resolution, data_words, resolve};
 use crate::domain::DomainId;
+#[cfg(feature = "standby")]
+use crate::exchange::PartnerMemory;
 use crate::info::SubDeviceInfo;
 use crate::junction::{JunctionConnection, JunctionError};
 use crate::procedures::data_words::{read_of_scan, scanned};

@@ -51,7 +51,7 @@ impl RoleRequest {
     }
 }
 
-/// Who requests a role, the lowest priority first. A request replaces one of the same or a lower priority that has not
+/// The origin of a request for a role, the lowest priority first. A request replaces one of the same or a lower priority that has not
 /// taken effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]

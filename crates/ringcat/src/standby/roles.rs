@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use ringcat_engine::main_device::{MainDeviceRole, PartnerMemory, SubDeviceId};
+use ringcat_engine::exchange::PartnerMemory;
+use ringcat_engine::main_device::{MainDeviceRole, SubDeviceId};
 use ringcat_engine::role::{Partner, RoleControl};
 use ringcat_engine::time::Instant;
 

@@ -7,7 +7,7 @@ use std::sync::Mutex;
 use std::time::Duration;
 
 use ringcat::simulated::two_hosts::{HostLinks, TwoHosts};
-use ringcat::standby::{MasterSizes, Policy, RoleRequest, StandbyOptions};
+use ringcat::standby::{MasterSizes, PartnerMemoryError, Policy, RoleRequest, StandbyOptions};
 use ringcat::{ActivateError, Error, MainDevice, MainDeviceRole, Options, automatic};
 use ringcat_sim::cable::{CableId, Host};
 use ringcat_sim::fault::Fault;
@@ -175,7 +175,8 @@ fn memory_that_is_too_short_is_refused_and_comes_back_and_so_does_a_used_one() {
         let mut declaration = automatic(&scan.subdevices, CYCLE);
         declaration.place_partner_data(Vec::leak(vec![1; ROOM]), Vec::leak(vec![2; 2_999]));
         let refused = main_device.activate(declaration.clone()).expect_err("a copy has the memory");
-        let is_shared = matches!(refused.error, Error::Activate(ActivateError::PartnerMemoryShared));
+        let is_shared =
+            matches!(refused.error, Error::Activate(ActivateError::PartnerMemory(PartnerMemoryError::Shared)));
         assert!(is_shared, "{}", refused.error);
         let refused = refused.main_device.activate(declaration).expect_err("it is too short");
         let words = refused.error.to_string();

@@ -10,8 +10,17 @@ use alloc::vec;
 use ringcat_wire::master_frame::Lengths;
 
 use crate::exchange::image::Bytes;
-use crate::main_device::PartnerMemory;
 use crate::role::MainDeviceRole;
+
+/// Memory of the application for process data between two MainDevices.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct PartnerMemory {
+    /// What the application sends, in either role.
+    pub to_partner: &'static mut [u8],
+    /// What has arrived, in either role.
+    pub from_partner: &'static mut [u8],
+}
 
 /// Process data between both.
 #[derive(Debug)]

@@ -7,13 +7,12 @@ use ringcat_wire::frame::MacAddress;
 use ringcat_wire::memory_write::MemoryWrite;
 
 use super::partner::{Items, PartnerWatch};
-use super::partner_data::PartnerData;
+use super::partner_data::{PartnerData, PartnerMemory};
 use super::readiness::ReadinessWatch;
 use crate::board::standby::StandbyWords;
 use crate::exchange::following::{Following, OutputsSeen};
 use crate::exchange::master_frames::MasterFrames;
 use crate::layout::{InputRun, PlannedMasterFrames};
-use crate::main_device::PartnerMemory;
 use crate::role::{MainDeviceRole, RoleControl};
 use crate::time::Instant;
 

@@ -13,6 +13,8 @@ use crate::domain::DomainId;
 use crate::info::Direction;
 use crate::junction::JunctionError;
 use crate::layout::LayoutError;
+#[cfg(feature = "standby")]
+use crate::main_device::declaration::partner_memory::PartnerMemoryError;
 use crate::main_device::declaration::{ExplicitLrw, MAX_UNDER_WAY};
 use crate::role::NotPermitted;
 use crate::segment::setup::SetupError;
@@ -91,15 +93,9 @@ pub enum ActivateError {
         /// Number of the domain.
         domain: DomainId,
     },
-    /// Memory that was given for process data between both MainDevices is shorter than that.
-    PartnerMemoryTooShort {
-        /// Bytes of the longer direction.
-        needed: usize,
-        /// Bytes of the shorter memory.
-        got: usize,
-    },
-    /// A copy of the declaration has the memory for process data between both MainDevices, too.
-    PartnerMemoryShared,
+    /// Memory for process data between both MainDevices cannot be used.
+    #[cfg(feature = "standby")]
+    PartnerMemory(PartnerMemoryError),
     /// Process data has another size or direction than when its place was registered.
     Registered {
         /// Number of the domain.
@@ -201,10 +197,9 @@ impl fmt::Display for ActivateError {
             ActivateError::MixedPlaces { domain } => {
                 write!(f, "domain {domain} has members and registered areas: register all of its process data, or none")
             }
-            ActivateError::MemoryTooShort { .. }
-            | ActivateError::MemoryShared { .. }
-            | ActivateError::PartnerMemoryTooShort { .. }
-            | ActivateError::PartnerMemoryShared => self.fmt_memory(f),
+            ActivateError::MemoryTooShort { .. } | ActivateError::MemoryShared { .. } => self.fmt_memory(f),
+            #[cfg(feature = "standby")]
+            ActivateError::PartnerMemory(error) => error.fmt(f),
             ActivateError::Registered { .. } => self.fmt_registered(f),
             ActivateError::NoDomain { subdevice } => write!(
                 f,
@@ -267,13 +262,6 @@ impl ActivateError {
                     "domain {domain}: a copy of the declaration has the memory for its image, too: drop it before"
                 )
             }
-            ActivateError::PartnerMemoryTooShort { needed, got } => {
-                write!(f, "process data between both MainDevices has {needed} bytes, the memory for it {got}")
-            }
-            ActivateError::PartnerMemoryShared => f.write_str(
-                "a copy of the declaration has the memory for process data between both MainDevices, too: drop it \
-                 before",
-            ),
             _ => Ok(()),
         }
     }

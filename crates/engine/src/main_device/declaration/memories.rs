@@ -1,4 +1,5 @@
-//! Memory of the application for the images of domains, and for process data between two MainDevices: declared with the domain, used from the activation on.
+//! Memory of the application for the images of domains, and for process data between two MainDevices: declared before,
+//! used from the activation on.
 //!
 //! The memory outlives the application: it is valid before the activation and after the end. Another process may map
 //! it, or a C program may own it.
@@ -7,8 +8,10 @@ use alloc::vec::Vec;
 
 use super::image_memory::ImageMemory;
 #[cfg(feature = "standby")]
-use super::partner_memory::PartnerMemory;
+use super::partner_memory::{DeclaredMemory, PartnerMemoryError};
 use crate::domain::DomainId;
+#[cfg(feature = "standby")]
+use crate::exchange::PartnerMemory;
 use crate::layout::Layout;
 use crate::main_device::activate::activate_error::ActivateError;
 use crate::main_device::declaration::{Declaration, DomainConfig};
@@ -35,6 +38,28 @@ impl Declaration {
             domain.memory = Some(ImageMemory::new(memory));
         }
     }
+
+    /// Puts process data for the other MainDevice, and of it, into memory of the application, which outlives the
+    /// MainDevice: leaked, static, or mapped into several processes. Each memory has at least the longer one of both
+    /// sizes ([`MasterSizes`](crate::layout::MasterSizes)); the activation refuses shorter ones. Without a second
+    /// MainDevice, nothing happens.
+    ///
+    /// What is in `to_partner` when a cycle leaves (as ACTIVE), or when the first master frame of a cycle arrives (as
+    /// INACTIVE), is sent; a change of the role does not change it. `from_partner` has the last cycle of which all has
+    /// arrived. It changes within a cycle before the application works, and, as ACTIVE, when the last master frame
+    /// comes back; never while the application works. Another process reads it while no cycle runs, or has a lock of
+    /// its own with the application.
+    ///
+    /// ```
+    /// use ringcat_engine::main_device::Declaration;
+    ///
+    /// let mut declaration = Declaration::default();
+    /// declaration.place_partner_data(Vec::leak(vec![0; 64]), Vec::leak(vec![0; 64]));
+    /// ```
+    #[cfg(feature = "standby")]
+    pub fn place_partner_data(&mut self, to_partner: &'static mut [u8], from_partner: &'static mut [u8]) {
+        self.partner_memory = Some(DeclaredMemory::new(to_partner, from_partner));
+    }
 }
 
 /// Memory of a loaded declaration.
@@ -59,7 +84,9 @@ impl Memories {
             return Err(ActivateError::MemoryShared { domain: DomainId(domain) });
         }
         #[cfg(feature = "standby")]
-        let partner = declaration.take_partner_memory()?;
+        let partner = declaration.partner_memory.take().map(DeclaredMemory::take).transpose();
+        #[cfg(feature = "standby")]
+        let partner = partner.map_err(ActivateError::PartnerMemory)?;
         let taken = declaration.domains.iter_mut().map(|domain| domain.memory.take()?.into_inner());
         Ok(Memories {
             images: taken.collect(),
@@ -90,7 +117,8 @@ impl Memories {
     pub fn check_partner(&self, needed: usize) -> Result<(), ActivateError> {
         let Some(PartnerMemory { to_partner, from_partner }) = &self.partner else { return Ok(()) };
         let got = to_partner.len().min(from_partner.len());
-        if got < needed { Err(ActivateError::PartnerMemoryTooShort { needed, got }) } else { Ok(()) }
+        let error = PartnerMemoryError::TooShort { needed, got };
+        if got < needed { Err(ActivateError::PartnerMemory(error)) } else { Ok(()) }
     }
 
     /// Takes the memory of all images.

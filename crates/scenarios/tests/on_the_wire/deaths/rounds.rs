@@ -44,7 +44,7 @@ impl Kind {
     pub const ALL: [Kind; 5] = [Kind::Killed, Kind::Stopped, Kind::Down, Kind::Hangs, Kind::Ends];
 }
 
-/// To whom.
+/// The controller to which it happens.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Victim {
     Active,
