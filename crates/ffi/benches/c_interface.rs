@@ -5,7 +5,8 @@
 //! * From the request of a master to OP of 50 SubDevices, in turn with all.
 //! * The cycles of an application at 1 kHz without and with 50 clients that ask 100 times in a second each.
 //!
-//! `cargo bench -p ringcat-ffi`; with the word `bars` the first two parts alone, for CI (`ci/bench --full`). Without a C compiler or valgrind the parts that need them report that.
+//! `cargo bench -p ringcat-ffi`; with the word `bars` the first two parts alone, for CI (`ci/bench --full`). Without
+//! a C compiler or valgrind the parts that need them report that.
 
 #[path = "c_interface/callgrind.rs"]
 mod callgrind;

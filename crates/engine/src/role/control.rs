@@ -51,8 +51,8 @@ impl RoleRequest {
     }
 }
 
-/// The origin of a request for a role, the lowest priority first. A request replaces one of the same or a lower priority that has not
-/// taken effect.
+/// The origin of a request for a role, the lowest priority first. A request replaces one of the same or a lower
+/// priority that has not taken effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum Requester {

@@ -15,7 +15,7 @@ const MAPPED: usize = 4;
 
 /// Reads the lists of PDOs of a SubDevice.
 #[derive(Debug)]
-pub struct Lists<'a> {
+pub(crate) struct Lists<'a> {
     mailbox: &'a Mailbox,
     limits: Limits,
     complete_access: bool,
@@ -23,18 +23,18 @@ pub struct Lists<'a> {
 
 impl<'a> Lists<'a> {
     /// Reads each entry by itself.
-    pub fn new(mailbox: &'a Mailbox, limits: Limits) -> Lists<'a> {
+    pub(crate) fn new(mailbox: &'a Mailbox, limits: Limits) -> Lists<'a> {
         Lists { mailbox, limits, complete_access: false }
     }
 
     /// Reads each list at once, if the SubDevice has complete access. From the first answer on that is no list, entries
     /// are read.
-    pub fn with_complete_access(self, complete_access: bool) -> Lists<'a> {
+    pub(crate) fn with_complete_access(self, complete_access: bool) -> Lists<'a> {
         Lists { complete_access, ..self }
     }
 
     /// The PDOs assigned to a SyncManager, with their mapping.
-    pub async fn assignment(&mut self, sync_manager: u8) -> Result<Vec<PdoMapping>, SdoError> {
+    pub(crate) async fn assignment(&mut self, sync_manager: u8) -> Result<Vec<PdoMapping>, SdoError> {
         let mut pdos = Vec::new();
         for index in self.list::<2>(ASSIGNMENT_BASE + u16::from(sync_manager)).await? {
             let index = u16::from_le_bytes(index);
@@ -44,7 +44,7 @@ impl<'a> Lists<'a> {
     }
 
     /// The mapping of a PDO.
-    pub async fn mapping(&mut self, pdo: u16) -> Result<Vec<PdoEntry>, SdoError> {
+    pub(crate) async fn mapping(&mut self, pdo: u16) -> Result<Vec<PdoEntry>, SdoError> {
         let entry = |[bit_length, sub_index, low, high]: [u8; MAPPED]| {
             PdoEntry::new(u16::from_le_bytes([low, high]), sub_index, bit_length)
         };

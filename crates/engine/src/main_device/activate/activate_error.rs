@@ -334,6 +334,8 @@ impl core::error::Error for ActivateError {
             ActivateError::Setup { error, .. } => Some(error),
             ActivateError::Junction(error) => Some(error),
             ActivateError::Layout(error) => Some(error),
+            #[cfg(feature = "standby")]
+            ActivateError::PartnerMemory(error) => Some(error),
             _ => None,
         }
     }

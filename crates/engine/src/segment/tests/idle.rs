@@ -93,7 +93,7 @@ fn idle_operation_starts_its_watches_once_and_an_application_its_own() {
 }
 
 #[test]
-fn subdevices_are_brought_to_preop_when_the_first_scan_has_ended_without_a_broadcast() {
+fn subdevices_go_to_preop_when_the_first_scan_has_ended_without_a_broadcast() {
     for has_begun_again in [false, true] {
         let mut idle = Idle::unscanned();
         idle.broadcast(3, 1);
