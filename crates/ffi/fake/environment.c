@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <inttypes.h>
 #include <limits.h>
+#include <pthread.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -21,8 +22,22 @@ static const char *variable(const char *name, const char *otherwise)
     return value && *value ? value : otherwise;
 }
 
+int fake_hold(void)
+{
+    int held = PTHREAD_CANCEL_ENABLE;
+
+    pthread_setcancelstate(PTHREAD_CANCEL_DISABLE, &held);
+    return held;
+}
+
+void fake_let(const int *held)
+{
+    pthread_setcancelstate(*held, NULL);
+}
+
 void fake_report(const char *format, ...)
 {
+    UNCANCELLED;
     va_list arguments;
 
     va_start(arguments, format);

@@ -112,7 +112,12 @@ struct ec_master {
     struct ec_master *next;
 };
 
-/* environment.c: variables and files */
+/* To the end of its block the thread cannot be cancelled: that would leave a master half changed. */
+#define UNCANCELLED int held __attribute__((cleanup(fake_let), unused)) = fake_hold()
+
+/* environment.c: variables, files, cancellation */
+int fake_hold(void);
+void fake_let(const int *held);
 const char *fake_prefix(void);
 int fake_domain_number(unsigned int created);
 int fake_write_slaves(const struct ec_master *master);

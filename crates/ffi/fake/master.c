@@ -50,6 +50,7 @@ int ecrt_master_reserve(ec_master_t *master)
 
 ec_master_t *ecrt_request_master(unsigned int master_index)
 {
+    UNCANCELLED;
     ec_master_t *master = ecrt_open_master(master_index);
 
     if (master && ecrt_master_reserve(master)) {
@@ -80,6 +81,7 @@ static void keep_released(ec_master_t *master)
 
 void ecrt_release_master(ec_master_t *master)
 {
+    UNCANCELLED;
     ec_master_t **at;
 
     if (!is_living(master, MARK_MASTER))
@@ -110,6 +112,7 @@ static int check_reserved(const ec_master_t *master)
 
 int ecrt_master_activate(ec_master_t *master)
 {
+    UNCANCELLED;
     int error = check_reserved(master);
 
     if (error || master->is_active)
@@ -131,6 +134,7 @@ int ecrt_master_activate(ec_master_t *master)
 
 int ecrt_master_deactivate(ec_master_t *master)
 {
+    UNCANCELLED;
     int error = check_reserved(master);
 
     if (error)

@@ -99,21 +99,34 @@ impl AnsweringDouble {
     #[inline(never)]
     pub fn answer(&self, sent: &mut FrameRing, arriving: &mut FrameRing) {
         while let Some((link, frame)) = sent.pop() {
-            let Some(key) = frame.get(KEY_AT..KEY_AT + 4) else { continue };
-            let Some(answer) = self.answers.iter().find(|answer| answer.key == *key) else { continue };
-            frame[SOURCE_AT] |= PROCESSED;
-            for patch in &answer.patches {
-                // A frame that is sent again has no supervision datagram.
-                if let Some(wkc) = frame.get_mut(patch.at..patch.at + WKC_LEN) {
-                    wkc.copy_from_slice(&patch.wkc[link.index()].to_le_bytes());
-                }
+            if self.process(link, frame) {
+                arriving.push(self.cabling.arrives_on(link), frame);
             }
-            if let Some(Shown { at, bytes }) = &answer.presence {
-                let bytes = &bytes[link.index()];
-                frame[*at..*at + bytes.len()].copy_from_slice(bytes);
-            }
-            arriving.push(self.cabling.arrives_on(link), frame);
         }
+    }
+
+    /// The SubDevices process a copy that was sent on a link; false if it is no frame of the layout.
+    #[inline(always)]
+    pub fn process(&self, link: Link, frame: &mut [u8]) -> bool {
+        let Some(key) = frame.get(KEY_AT..KEY_AT + 4) else { return false };
+        let Some(answer) = self.answers.iter().find(|answer| answer.key == *key) else { return false };
+        frame[SOURCE_AT] |= PROCESSED;
+        for patch in &answer.patches {
+            // A frame that is sent again has no supervision datagram.
+            if let Some(wkc) = frame.get_mut(patch.at..patch.at + WKC_LEN) {
+                wkc.copy_from_slice(&patch.wkc[link.index()].to_le_bytes());
+            }
+        }
+        if let Some(Shown { at, bytes }) = &answer.presence {
+            let bytes = &bytes[link.index()];
+            frame[*at..*at + bytes.len()].copy_from_slice(bytes);
+        }
+        true
+    }
+
+    /// The link on which a copy comes back.
+    pub fn arrives_on(&self, sent_on: Link) -> Link {
+        self.cabling.arrives_on(sent_on)
     }
 }
 

@@ -91,7 +91,7 @@ impl CyclicLoad {
     /// # Errors
     /// Process data that cannot be laid out.
     pub fn new(spec: &LoadSpec) -> Result<CyclicLoad, LayoutError> {
-        CyclicLoad::with(spec, |_, _| ())
+        CyclicLoad::with(spec, |_, _| Ok(()))
     }
 
     /// The same, and lost frames are sent again within their cycle: for [`CyclicLoad::cycle_with_tries`].
@@ -100,10 +100,16 @@ impl CyclicLoad {
     /// Process data that cannot be laid out.
     pub fn sending_again(spec: &LoadSpec) -> Result<CyclicLoad, LayoutError> {
         let rules = vec![RepeatRule::default(); spec.subdevices];
-        CyclicLoad::with(spec, |exchange, layout| exchange.send_lost_frames_again(layout, &rules, |_| true))
+        CyclicLoad::with(spec, |exchange, layout| {
+            exchange.send_lost_frames_again(layout, &rules, |_| true);
+            Ok(())
+        })
     }
 
-    fn with(spec: &LoadSpec, set_up: impl FnOnce(&mut Exchange, &Layout)) -> Result<CyclicLoad, LayoutError> {
+    pub(crate) fn with(
+        spec: &LoadSpec,
+        set_up: impl FnOnce(&mut Exchange, &Layout) -> Result<(), LayoutError>,
+    ) -> Result<CyclicLoad, LayoutError> {
         let (links, redundant) = match spec.cabling {
             Cabling::Line => (LinkSet::Single, None),
             Cabling::ClosedRing | Cabling::CutRing { .. } => (LinkSet::Ring, Some(REDUNDANT)),
@@ -116,7 +122,7 @@ impl CyclicLoad {
         let (producer, events) = queue(EVENTS);
         let identity = Identity::new(MacCodec::FlagsFirst, MAIN, redundant);
         let mut exchange = Exchange::new(identity, links, &layout, board.clone(), producer);
-        set_up(&mut exchange, &layout);
+        set_up(&mut exchange, &layout)?;
         Ok(CyclicLoad {
             exchange,
             links: MemoryLinks::new(MAIN, redundant, LINK_QUEUE),
@@ -131,6 +137,11 @@ impl CyclicLoad {
     /// frames are sent. Returns the last domain's status.
     #[inline(never)]
     pub fn exchange_once(&mut self) -> DomainStatus {
+        self.exchange_inline()
+    }
+
+    #[inline(always)]
+    pub(crate) fn exchange_inline(&mut self) -> DomainStatus {
         let CyclicLoad { exchange, links, now, .. } = self;
         *now += PERIOD;
         links.set_now(*now);

@@ -15,6 +15,7 @@ pub mod clocks;
 pub mod counting_allocator;
 pub mod cpu_time;
 pub mod cyclic_load;
+pub mod cyclic_pair;
 pub mod delays;
 pub mod dice;
 pub mod ethernet_host;

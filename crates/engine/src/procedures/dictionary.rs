@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 use core::time::Duration;
 
 use ringcat_wire::al::AlState;
+use ringcat_wire::mailbox::coe::pdo_objects::ASSIGNMENT_BASE;
 
 use super::scan::Scan;
 use super::visit::visit;
@@ -50,10 +51,14 @@ pub(super) async fn read(bus: &Bus, info: &SubDeviceInfo, mailbox: &Mailbox) -> 
 async fn assignments(info: &SubDeviceInfo, mailbox: &Mailbox) -> Result<Dictionary, SdoError> {
     let (mut held, mut missing) = (Vec::new(), Vec::new());
     let mut lists = Lists::new(mailbox, LIMITS).with_complete_access(info.coe.complete_access());
+    let assignment = |sync_manager: u8| ASSIGNMENT_BASE + u16::from(sync_manager);
     for (sync_manager, direction) in info.process_data() {
         match lists.assignment(sync_manager).await {
             Ok(pdos) => held.push(PdoAssignment::new(sync_manager, direction, pdos)),
-            Err(error) if error.is_missing_object() => missing.push(error),
+            // A mapping that is missing is a fault.
+            Err(error) if error.is_missing_object() && error.object.index == assignment(sync_manager) => {
+                missing.push(error);
+            }
             Err(error) => return Err(error),
         }
     }

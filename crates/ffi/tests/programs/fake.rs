@@ -171,6 +171,15 @@ fn the_first_application_reaches_op_at_once_on_the_fake_library() {
     }
 }
 
+// covers: c-interface
+#[test]
+fn no_call_of_the_fake_library_is_a_cancellation_point() {
+    let arguments = ["-pthread", "-Wl,--enable-new-dtags"];
+    let Some(cancelled) = program(&here().join("tests/c/cancelled.c"), &arguments) else { return };
+    let place = Place::new("cancelled");
+    assert_eq!(finish(place.command(&cancelled, "cancelled").arg("fake")), "no call was cancelled\n");
+}
+
 /// Under memcheck where it is installed: it would find memory that was freed.
 // covers: c-interface
 #[test]

@@ -1,6 +1,7 @@
 //! The tables of docs/ecrt.md as a C header, from which the conformance programs are made: what each function returns
 //! in each phase, and with arguments that are wrong or extreme, each with its source.
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -15,8 +16,9 @@ type Row = [String; 4];
 /// The rows of both tables: by phase, and by argument. A dash is no promise.
 fn rows() -> (Vec<Row>, Vec<Row>) {
     let page = std::fs::read_to_string(root().join("docs/ecrt.md")).expect("docs/ecrt.md");
+    let (_, tables) = page.split_once("\n## Return codes by phase\n").expect("the tables");
     let (mut by_phase, mut by_argument) = (Vec::new(), Vec::new());
-    for line in page.lines().filter(|line| line.starts_with("| `ecrt_")) {
+    for line in tables.lines().filter(|line| line.starts_with("| `ecrt_")) {
         let cells: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
         let row = |when: &str, code: &str, source: &str| -> Row {
             [cells[0].trim_matches('`'), when, code, source].map(str::to_owned)
@@ -27,7 +29,7 @@ fn rows() -> (Vec<Row>, Vec<Row>) {
                 let cells = PHASES.into_iter().zip(codes).filter(|(_, code)| **code != "-");
                 by_phase.extend(cells.map(|(phase, code)| row(phase, code, source)));
             }
-            _ => {}
+            _ => panic!("expected 4 or 7 cells: {line}"),
         }
     }
     (by_phase, by_argument)
@@ -72,4 +74,12 @@ fn the_tables_of_results_have_each_function_and_no_row_twice() {
         assert!(twice.is_empty(), "{twice:?}");
         assert!(rows.iter().flatten().all(|cell| !cell.is_empty()));
     }
+    // All functions that the library has, in the first table. Those without a handle are called for themselves.
+    let map = std::fs::read_to_string(here().join("libethercat.map")).expect("the list of functions");
+    let words = map.split(|it: char| !(it.is_ascii_alphanumeric() || it == '_'));
+    let of_library: BTreeSet<&str> = words.filter(|word| word.starts_with("ecrt_")).collect();
+    let without_handle = ["ecrt_read_real", "ecrt_read_lreal", "ecrt_write_real", "ecrt_write_lreal"];
+    let called: BTreeSet<&str> = by_phase.iter().map(|[function, ..]| function.as_str()).collect();
+    let others = without_handle.into_iter().chain(["ecrt_version_magic", "ecrt_release_master"]);
+    assert_eq!(called.into_iter().chain(others).collect::<BTreeSet<_>>(), of_library);
 }

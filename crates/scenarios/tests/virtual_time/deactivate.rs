@@ -23,8 +23,8 @@ const LIMIT: Duration = Duration::from_secs(1);
 const BESIDE_CHANGES: Duration = Duration::from_millis(10);
 /// The set-up of clocks that are known: one latched frame shows that the segment is the same, another gives the times
 /// for the offsets, then offsets, delays and filters of all are written. It needs one cycle more than the
-/// configuration beside it; the lock of the clocks is not awaited.
-const CLOCK_SET_UP: Duration = CYCLE;
+/// configuration beside it, two if it begins late in a cycle; the lock of the clocks is not awaited.
+const CLOCK_SET_UP: Duration = Duration::from_millis(2);
 /// DC_SYSTEM_TIME_OFFSET to DC_SPEED_COUNTER_DIFFERENCE and the filters.
 const CLOCK_SET_UP_REGISTERS: std::ops::Range<u16> = 0x0920..0x0936;
 /// Two with a mailbox, two with device emulation, two with neither.

@@ -93,12 +93,12 @@ pub async fn read_mapping(mailbox: &Mailbox, pdo: u16, limits: Limits) -> Result
     Lists::new(mailbox, limits).mapping(pdo).await
 }
 
-/// The entries of a list that was read with complete access; `None` if it has fewer than its subindex 0 says, or is not
-/// padded.
+/// The entries of a list that was read with complete access; `None` if it has not exactly as many as its subindex 0
+/// says, padded: with a tail an unpadded one might be taken for another list.
 fn entries_of<const N: usize>(bytes: &[u8]) -> Option<Vec<[u8; N]>> {
     let (&[count, 0], rest) = bytes.split_first_chunk()? else { return None };
-    let entries = rest.as_chunks().0.get(..usize::from(count))?;
-    Some(entries.to_vec())
+    let (entries, tail) = rest.as_chunks();
+    (entries.len() == usize::from(count) && tail.is_empty()).then(|| entries.to_vec())
 }
 
 /// Assigns PDOs to a SyncManager, and maps those with given entries. The SubDevice must be in PREOP. After an error the
@@ -144,8 +144,10 @@ mod tests {
     fn a_list_is_padded_and_has_as_many_entries_as_it_says() {
         assert_eq!(entries_of(&[2, 0, 0x00, 0x1A, 0x01, 0x1A]), Some(vec![[0x00, 0x1A], [0x01, 0x1A]]));
         assert_eq!(entries_of::<4>(&[0, 0]), Some(vec![]));
-        // Entries that are not in use.
-        assert_eq!(entries_of(&[1, 0, 16, 0, 0x40, 0x60, 0, 0, 0, 0]), Some(vec![[16, 0, 0x40, 0x60]]));
+        assert_eq!(entries_of(&[1, 0, 16, 0, 0x40, 0x60]), Some(vec![[16, 0, 0x40, 0x60]]));
+        // Entries that are not in use, or no padding and a tail.
+        assert_eq!(entries_of::<4>(&[1, 0, 16, 0, 0x40, 0x60, 0, 0, 0, 0]), None);
+        assert_eq!(entries_of::<2>(&[2, 0x00, 0x1A, 0x01, 0x1A, 0, 0]), None);
         // Too short, without the padding.
         for bytes in [&[][..], &[1], &[1, 0, 0x00], &[2, 0, 0x00, 0x1A], &[1, 0x00, 0x1A], &[2, 0x00, 0x1A, 1, 0x1A]] {
             assert_eq!(entries_of::<2>(bytes), None, "{bytes:?}");
