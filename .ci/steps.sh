@@ -255,8 +255,8 @@ demo() {
     local too_large=0
     cargo run --release
     cargo run --release -- demo --standby
-    small ringcat 11300000 || too_large=1
-    small ringcatd 7210000 || too_large=1
+    small ringcat 11310000 || too_large=1
+    small ringcatd 7220000 || too_large=1
     small ethercat 1870000 || too_large=1
     return "$too_large"
 }
