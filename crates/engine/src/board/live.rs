@@ -90,6 +90,8 @@ struct Words {
 #[derive(Debug, Default)]
 pub struct LiveWords {
     subdevices: Vec<Words>,
+    /// Changes of presence and AL status of any SubDevice.
+    changes: AtomicU64,
     /// The SubDevices by their station addresses, in order. The addresses do not change.
     stations: Vec<(StationAddress, usize)>,
     /// By link two bits: 0 is unknown, 1 no carrier, 2 carrier.
@@ -121,6 +123,22 @@ impl LiveWords {
         Some(Life::unpack(self.subdevices.get(subdevice)?.life.load(Ordering::Relaxed)))
     }
 
+    /// Number of changes of presence and AL status of any SubDevice: while it is the same, so is what [`Self::life`]
+    /// returned after it was read.
+    #[cfg(feature = "standby")]
+    pub fn changes(&self) -> u64 {
+        self.changes.load(Ordering::Acquire)
+    }
+
+    /// Stores a life, then counts the change: a reader that has the new number has the new life too.
+    fn store_life(&self, words: &Words, life: Life) {
+        let life = life.pack();
+        if words.life.load(Ordering::Relaxed) != life {
+            words.life.store(life, Ordering::Relaxed);
+            self.changes.fetch_add(1, Ordering::Release);
+        }
+    }
+
     /// Posts the presence of a SubDevice. What was read at its address while it was offline is forgotten: another
     /// SubDevice may have answered there.
     pub(crate) fn post_presence(&self, subdevice: usize, presence: Presence) {
@@ -130,14 +148,14 @@ impl LiveWords {
             (_, Presence::Offline) | (Presence::Offline, _) => Life { presence, ..Life::default() },
             _ => Life { presence, ..before },
         };
-        words.life.store(life.pack(), Ordering::Relaxed);
+        self.store_life(words, life);
     }
 
     /// Posts presence and AL status of a SubDevice as reported by another MainDevice.
     #[cfg(feature = "standby")]
     pub(crate) fn post_life(&self, subdevice: usize, life: Life) {
         if let Some(words) = self.subdevices.get(subdevice) {
-            words.life.store(life.pack(), Ordering::Relaxed);
+            self.store_life(words, life);
         }
     }
 
@@ -153,7 +171,7 @@ impl LiveWords {
         // Without an error the register may contain an identification (protocol 5.3).
         let code = if status.error { code.0 } else { 0 };
         let life = Life { al_status: status.bits() as u8, code, ..before };
-        words.life.store(life.pack(), Ordering::Relaxed);
+        self.store_life(words, life);
     }
 
     /// Working counters of a SubDevice.

@@ -64,6 +64,8 @@ pub(super) struct MasterFrames {
     moves: Box<[Move]>,
     /// The domain of each SubDevice whose inputs are shown as fresh or not.
     domains: Box<[Option<DomainId>]>,
+    /// [`Board`]'s number of changes for which the states in the frames are valid, if all inputs were fresh then.
+    states_at: Option<u64>,
     /// The cycle that was sent last.
     pub cycle: u32,
     /// Its header.
@@ -99,6 +101,7 @@ impl MasterFrames {
             moves: moves(planned, &frames),
             frames: frames.into_boxed_slice(),
             domains,
+            states_at: None,
             cycle: 0,
             header: Header { lengths, fragments: number, ..header },
             coming: zeros(lengths.to_active),
@@ -144,7 +147,7 @@ impl MasterFrames {
         self.cycle = self.cycle.wrapping_add(1);
         self.filled.1 = 0;
         self.write_diagnosis(sources);
-        self.header.state = self.write_states(sources);
+        self.write_states(sources);
         let cycle = self.cycle;
         self.frames.iter_mut().for_each(|frame| frame.begin(cycle));
         for at in &self.moves {
@@ -164,9 +167,15 @@ impl MasterFrames {
         self.frames.iter_mut().for_each(|frame| frame.write_area(Area::Header, &header));
     }
 
-    /// A byte per SubDevice; returns the lowest state of those that answer.
-    fn write_states(&mut self, sources: &Sources<'_>) -> u8 {
+    /// A byte per SubDevice, and the lowest state of those that answer. Those of the last cycle stay while no state has
+    /// changed and all inputs are fresh, as in nearly every cycle.
+    fn write_states(&mut self, sources: &Sources<'_>) {
         let are_fresh = sources.domains.iter().all(|domain| domain.state() == DomainState::Complete);
+        // Before the states: one that changes meanwhile is written in the next cycle.
+        let states_at = are_fresh.then(|| sources.board.live.changes());
+        if states_at.is_some() && states_at == self.states_at {
+            return;
+        }
         let mut lowest = u8::MAX;
         for frame in &mut self.frames {
             let domains = &self.domains;
@@ -186,7 +195,8 @@ impl MasterFrames {
                 record.with_fresh(answers && (are_fresh || is_fresh())).0
             });
         }
-        if lowest == u8::MAX { 0 } else { lowest }
+        self.states_at = states_at;
+        self.header.state = if lowest == u8::MAX { 0 } else { lowest };
     }
 
     fn write_diagnosis(&mut self, sources: &Sources<'_>) {
