@@ -20,6 +20,8 @@ pub(crate) struct Timeline {
     pub slid: u64,
     /// System time of the reference clock at host time zero.
     pub epoch: u64,
+    /// The shift was read from clocks that another MainDevice has set up, and is as exact as one reading.
+    pub is_adopted: bool,
 }
 
 /// The time towards which the reference is steered.
@@ -47,6 +49,7 @@ pub(crate) struct TimeWords {
     left: AtomicI64,
     slid_before: AtomicU64,
     epoch: AtomicU64,
+    is_adopted: AtomicBool,
     number: AtomicU32,
     /// Nanoseconds by which the system time has gone back in steps.
     slid: AtomicU64,
@@ -100,6 +103,7 @@ impl TimeWords {
         self.left.store(timeline.left, Ordering::Relaxed);
         self.slid_before.store(timeline.slid, Ordering::Relaxed);
         self.epoch.store(timeline.epoch, Ordering::Relaxed);
+        self.is_adopted.store(timeline.is_adopted, Ordering::Relaxed);
         self.number.store(timeline.number, Ordering::Release);
     }
 
@@ -112,6 +116,7 @@ impl TimeWords {
             left: self.left.load(Ordering::Relaxed),
             slid: self.slid_before.load(Ordering::Relaxed),
             epoch: self.epoch.load(Ordering::Relaxed),
+            is_adopted: self.is_adopted.load(Ordering::Relaxed),
         }
     }
 

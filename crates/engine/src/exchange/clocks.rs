@@ -7,13 +7,14 @@
 //! prediction. When ports have changed, or a ring has closed, no time is distributed until the supervisor has the new
 //! delays.
 
-use ringcat_wire::address::{RegisterAddress, StationAddress, Wkc};
-use ringcat_wire::datagram::HEADER_LEN;
-use ringcat_wire::register::{EcatEvent, map};
+use ringcat_wire::address::StationAddress;
+use ringcat_wire::register::EcatEvent;
 
+mod behind;
 mod calls;
 mod gap;
 mod lead;
+mod payload;
 mod rate;
 mod slide;
 
@@ -25,22 +26,20 @@ use crate::link::Link;
 use crate::queue::Producer;
 use crate::ring::{Arrivals, RingState};
 use crate::time::Instant;
+use behind::{Behind, Steering};
 use calls::Calls;
 pub use calls::ClockDatagrams;
 use lead::Lead;
+pub(crate) use payload::{CLOCK_DATA, Payload, Places, Seen};
 use rate::Rate;
 use slide::Slide;
 
-/// Data of each datagram: the low half of a time.
-pub(crate) const CLOCK_DATA: usize = 4;
 /// Beyond this difference the reference is not steered: its control loop would take more than a tenth of a second, and
 /// the clocks that follow it could not. The supervisor sets all clocks, or continues with another shift.
 const FAR_NS: i64 = 100_000;
 /// A reading that is older than this is not used for a reference that was steered since: the reference then has the
 /// time that was written.
 const OLD_NS: u64 = 100_000_000;
-/// Event requests in the header of a datagram.
-const IRQ_AT: usize = HEADER_LEN - 2;
 
 /// Choices of the application.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -68,85 +67,6 @@ impl ReferenceTime {
     /// rate.
     pub const fn at(self, now: Instant) -> u64 {
         self.time.wrapping_add(now.0.wrapping_sub(self.sent_at.0))
-    }
-}
-
-/// Offsets of the datagrams' headers in the frame.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Places {
-    pub sync_at: usize,
-    pub steer_at: usize,
-    pub spread_at: usize,
-}
-
-/// Content of the datagrams in a copy.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Payload {
-    sync: Option<(StationAddress, u32)>,
-    steer: Option<(StationAddress, u32)>,
-    /// The differences are read.
-    pub monitors: bool,
-}
-
-/// Result of the datagrams in the copies of a flight.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Seen {
-    pub sent_at: Instant,
-    /// References that it distributed, by number of posts.
-    pub references: u32,
-    /// It reads the differences.
-    pub monitors: bool,
-    /// Low half of the distributed time and working counter, by the link on which the copy was sent.
-    sync: [(u32, Wkc); 2],
-    spread: u32,
-    spread_wkc: u16,
-    /// Events that SubDevices request, under their mask (protocol 3.5).
-    events: u16,
-}
-
-impl Places {
-    /// Writes the content of a copy.
-    pub(crate) fn write(&self, bytes: &mut [u8], payload: &Payload) {
-        write(bytes, self.sync_at, payload.sync);
-        write(bytes, self.steer_at, payload.steer);
-        // A read of another register by all has no meaning, and no effect.
-        let register = if payload.monitors { map::DC_SYSTEM_TIME_DIFFERENCE } else { RegisterAddress(0) };
-        if let Some(bytes) = bytes.get_mut(self.spread_at + 4..self.spread_at + 6) {
-            bytes.copy_from_slice(&register.0.to_le_bytes());
-        }
-    }
-
-    /// Takes the result of a copy.
-    pub(crate) fn read(&self, seen: &mut Seen, sent_on: Link, bytes: &[u8]) {
-        let (time, wkc) = data_at(bytes, self.sync_at);
-        seen.sync[sent_on.index()] = (time, Wkc(wkc));
-        let (spread, wkc) = data_at(bytes, self.spread_at);
-        seen.spread |= spread & 0x7FFF_FFFF;
-        seen.spread_wkc = seen.spread_wkc.saturating_add(wkc);
-        if let Some([low, high]) = bytes.get(self.spread_at + IRQ_AT..).and_then(<[u8]>::first_chunk) {
-            seen.events |= u16::from_le_bytes([*low, *high]);
-        }
-    }
-}
-
-/// Address and data of a datagram. An unused one addresses no SubDevice, at a register without effect: the command of
-/// both copies stays the same.
-fn write(bytes: &mut [u8], at: usize, content: Option<(StationAddress, u32)>) {
-    let (station, register, data) = match content {
-        Some((station, data)) => (station, map::DC_SYSTEM_TIME, data),
-        None => (StationAddress(0), RegisterAddress(0), 0),
-    };
-    if let Some(bytes) = bytes.get_mut(at + 2..at + HEADER_LEN + CLOCK_DATA) {
-        bytes[..2].copy_from_slice(&station.0.to_le_bytes());
-        bytes[2..4].copy_from_slice(&register.0.to_le_bytes());
-        bytes[HEADER_LEN - 2..].copy_from_slice(&data.to_le_bytes());
-    }
-}
-
-fn data_at(bytes: &[u8], at: usize) -> (u32, u16) {
-    match bytes.get(at + HEADER_LEN..).and_then(<[u8]>::first_chunk::<{ CLOCK_DATA + 2 }>) {
-        Some([a, b, c, d, low, high]) => (u32::from_le_bytes([*a, *b, *c, *d]), u16::from_le_bytes([*low, *high])),
-        None => (0, 0),
     }
 }
 
@@ -180,8 +100,8 @@ pub(crate) struct Clocks {
     rate: Rate,
     /// Difference between the steered reference and the segment's reference.
     lead: Option<Lead>,
-    /// Difference between the segment's reference and the time that it is to follow, and its last value.
-    behind: Option<Lead>,
+    /// Difference between the segment's reference and the time that it is to follow, and the last such time.
+    behind: Behind,
     led: Option<ReferenceTime>,
     /// The application's time, and when it was set.
     application: Option<ReferenceTime>,
@@ -287,10 +207,15 @@ impl Clocks {
     #[cold]
     fn follow(&mut self, references: References, changes: u32, board: &Board, now: Instant) {
         let continued = self.written_epoch.map(|written| self.wanted_epoch.wrapping_sub(written));
-        let jump = self.slide.follow(board.clocks.times.timeline(), continued, now);
+        let timeline = board.clocks.times.timeline();
+        let is_new = self.slide.is_before(timeline);
+        let jump = self.slide.follow(timeline, continued, now);
         if jump != 0 {
             self.move_times(jump);
-            self.behind = None;
+            self.behind = Behind::default();
+        }
+        if is_new && timeline.is_adopted {
+            self.adopt();
         }
         self.last = self.system_time().or(self.last);
         for link in Link::ALL {
@@ -303,11 +228,18 @@ impl Clocks {
         self.lead = None;
         let leader = |references: References| references.leader().0.and_then(|link| references.on(link));
         if leader(references) != leader(self.references) {
-            self.behind = None;
+            self.behind.restart();
             self.rate.restart();
         }
         (self.references, self.changes) = (references, changes);
         board.clocks.times.take(changes);
+    }
+
+    /// Another MainDevice has driven the clocks until now: what was read of them is old.
+    fn adopt(&mut self) {
+        (self.times, self.last, self.led, self.lead) = ([None; 2], None, None, None);
+        self.rate.restart();
+        self.behind = Behind::adopted();
     }
 
     /// The system time has jumped since the references were read.
@@ -359,10 +291,10 @@ impl Clocks {
         };
         let time = self.written_time(time, leader, board, now)?;
         self.led = Some(ReferenceTime { time, sent_at: now });
-        let behind = self.behind.filter(|behind| behind.is_fresh(now));
-        let written = match (self.times[leader.index()], behind.and_then(|behind| behind.steering_ns())) {
-            (Some(own), Some(too_much)) => own.at(now).wrapping_sub(too_much as u64),
-            _ => time,
+        let written = match (self.times[leader.index()], self.behind.steering(now)) {
+            (_, Steering::Free) => return None,
+            (Some(own), Steering::By(too_much)) => own.at(now).wrapping_sub(too_much as u64),
+            (None, Steering::By(_)) | (_, Steering::ToTime) => time,
         };
         Some((station, written as u32))
     }
@@ -376,6 +308,7 @@ impl Clocks {
             // The clocks were read before it.
             self.move_times(step.wrapping_neg());
         }
+        self.slide.take_application_time(application, now);
         let shift = self.slide.step(now);
         self.wanted_epoch = epoch;
         board.clocks.times.post_wanted(epoch, shift);
@@ -473,8 +406,7 @@ impl Clocks {
         if is_far(difference) {
             return;
         }
-        let behind = self.behind.filter(|behind| behind.is_fresh(sent_at));
-        self.behind = Some(behind.map_or(Lead::behind_host(sent_at), |behind| behind.go_on(difference, sent_at)));
+        self.behind.observe(difference, sent_at);
     }
 
     fn evaluate_spread(&mut self, spread_ns: u32, is_conclusive: bool, board: &Board, events: &mut Producer) {

@@ -143,6 +143,23 @@ impl Lead {
         Lead { law, depth, finding: None, mode, ..Lead::begin(0, false, seen_at) }
     }
 
+    /// A reference that has followed another host until now and goes on without a step: the difference to this host's
+    /// time is found first.
+    pub const fn adopted(seen_at: Instant) -> Lead {
+        Lead { finding: Some(Finding::begin(true)), mode: Mode::Near, ..Lead::behind_host(seen_at) }
+    }
+
+    /// The difference while both show the same time; `None` while it is being found.
+    pub const fn found_gap(&self) -> Option<i64> {
+        if self.finding.is_none() { Some(self.gap) } else { None }
+    }
+
+    /// The same beginning with a known difference while both show the same time.
+    #[must_use]
+    pub const fn with_gap(self, gap: i64) -> Lead {
+        Lead { gap, finding: None, ..self }
+    }
+
     /// Whether the last difference is recent enough.
     pub const fn is_fresh(&self, now: Instant) -> bool {
         now.0.saturating_sub(self.seen_at.0) <= FRESH_NS

@@ -33,21 +33,35 @@ pub(super) struct Slide {
     rest: u64,
     /// System time of the reference clock at host time zero when the system time was posted; `None` before.
     epoch: Option<u64>,
+    /// The system time was set by another MainDevice: the next application time determines the shift.
+    is_adopted: bool,
 }
 
 impl Slide {
+    /// Whether a posted system time is another one than that taken over last.
+    pub const fn is_before(&self, timeline: Timeline) -> bool {
+        timeline.number != self.number
+    }
+
     /// Takes over a posted system time; returns its jump. `continued` is the application time minus the system time
     /// that was written last, if any: that goes on without a step.
     pub fn follow(&mut self, timeline: Timeline, continued: Option<u64>, now: Instant) -> u64 {
         let jump = timeline.jumped.wrapping_sub(self.jumped);
-        if timeline.number != self.number {
-            let Timeline { number, jumped, shift, left, slid, epoch } = timeline;
+        if self.is_before(timeline) {
+            let Timeline { number, jumped, shift, left, slid, epoch, is_adopted } = timeline;
             let exact = continued.map(|continued| shift.wrapping_sub(continued) as i64);
             let is_same = |exact: &i64| left > 0 && exact.wrapping_sub(left).unsigned_abs() <= SAME_NS;
             let left = exact.filter(is_same).unwrap_or(left);
-            *self = Slide { number, jumped, shift, left, slid, at: now, rest: 0, epoch: Some(epoch) };
+            *self = Slide { number, jumped, shift, left, slid, at: now, rest: 0, epoch: Some(epoch), is_adopted };
         }
         jump
+    }
+
+    /// Takes an application time: the first one after an adoption is that of the system, with a shift.
+    pub fn take_application_time(&mut self, time: u64, now: Instant) {
+        if let Some(system) = self.posted_time(now).filter(|_| self.is_adopted) {
+            (self.shift, self.is_adopted) = (time.wrapping_sub(system), false);
+        }
     }
 
     /// Application time minus system time, once all is made up.
@@ -92,7 +106,15 @@ mod tests {
     #[test]
     fn the_shift_in_effect_follows_the_steps_of_the_offsets_and_nothing_else() {
         let mut slide = Slide::default();
-        let timeline = Timeline { number: 1, jumped: 0, shift: 21_000_000, left: 250_000, slid: 1_000, epoch: 5 };
+        let timeline = Timeline {
+            number: 1,
+            jumped: 0,
+            shift: 21_000_000,
+            left: 250_000,
+            slid: 1_000,
+            epoch: 5,
+            ..Timeline::default()
+        };
         assert_eq!(slide.follow(timeline, None, Instant(0)), 0);
         assert_eq!(slide.in_effect(), 20_750_000);
         assert_eq!((slide.take_steps(1_000), slide.step(Instant(1_000_000))), (0, 20_750_000));
@@ -100,9 +122,30 @@ mod tests {
         assert_eq!((slide.take_steps(251_000), slide.step(Instant(3_000_000))), (249_600, slide.shift()));
     }
 
+    // covers: 7.4, standby
+    #[test]
+    fn after_an_adoption_the_first_application_time_determines_the_shift() {
+        let timeline = Timeline { number: 1, shift: 21_000_000, epoch: 5_000, is_adopted: true, ..Timeline::default() };
+        let mut slide = Slide::default();
+        slide.follow(timeline, Some(20_757_000), Instant(0));
+        assert_eq!(slide.in_effect(), 21_000_000, "it was read");
+        slide.take_application_time(25_005_010, Instant(10));
+        assert_eq!(slide.in_effect(), 25_000_000);
+        slide.take_application_time(0, Instant(20));
+        assert_eq!((slide.step(Instant(30)), slide.shift()), (25_000_000, 25_000_000), "later ones are followed");
+    }
+
     #[test]
     fn the_time_that_is_written_goes_on_where_the_reference_is() {
-        let timeline = Timeline { number: 1, jumped: 0, shift: 21_000_000, left: 250_000, slid: 0, epoch: 5 };
+        let timeline = Timeline {
+            number: 1,
+            jumped: 0,
+            shift: 21_000_000,
+            left: 250_000,
+            slid: 0,
+            epoch: 5,
+            ..Timeline::default()
+        };
         for (continued, in_effect) in [(20_757_000, 20_757_000), (20_690_000, 20_750_000)] {
             let mut slide = Slide::default();
             slide.follow(timeline, Some(continued), Instant(0));
@@ -116,7 +159,15 @@ mod tests {
     #[test]
     fn a_small_rest_forward_is_made_up_by_200_ns_per_millisecond() {
         let mut slide = Slide::default();
-        let timeline = Timeline { number: 1, jumped: 0, shift: 7_000_000, left: -10_000, slid: 0, epoch: 5 };
+        let timeline = Timeline {
+            number: 1,
+            jumped: 0,
+            shift: 7_000_000,
+            left: -10_000,
+            slid: 0,
+            epoch: 5,
+            ..Timeline::default()
+        };
         slide.follow(timeline, None, Instant(0));
         for cycle in 1..=50 {
             assert_eq!(slide.step(Instant(cycle * 1_000_000)), 7_010_000 - cycle * 200);
@@ -127,7 +178,8 @@ mod tests {
     #[test]
     fn a_jump_counts_once() {
         let mut slide = Slide::default();
-        let timeline = Timeline { number: 1, jumped: 77, shift: 0, left: 0, slid: 0, epoch: 1_000 };
+        let timeline =
+            Timeline { number: 1, jumped: 77, shift: 0, left: 0, slid: 0, epoch: 1_000, ..Timeline::default() };
         assert_eq!(slide.follow(timeline, None, Instant(0)), 77);
         assert_eq!(slide.follow(timeline, None, Instant(0)), 0);
         assert_eq!(slide.step(Instant(1 << 40)), 0);

@@ -88,7 +88,9 @@ fn parameters(declaration: &Declaration, options: &Options) -> u32 {
 
 fn clocks(declaration: &Declaration) -> u32 {
     let mut digest = Digest::default();
-    digest.field(1, &declaration.clocks, &None);
+    // The epoch contains the time at which a computer was started: it differs on each.
+    let clocks = declaration.clocks.clone().map(|clocks| clocks.with_epoch(0));
+    digest.field(1, &clocks, &None);
     digest.short()
 }
 
@@ -120,7 +122,7 @@ fn unknown_item(number: u16) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::SubDeviceConfig;
+    use crate::config::{ClockConfig, SubDeviceConfig};
     use ringcat_wire::frame::MacAddress;
 
     fn configuration(change: impl FnOnce(&mut Declaration, &mut Options)) -> Configuration {
@@ -147,6 +149,14 @@ mod tests {
     #[test]
     fn each_difference_of_two_configurations_has_a_name() {
         assert!(differing(|_, _| ()).is_empty());
+        let with_clocks = |epoch: u64| {
+            move |it: &mut Declaration, _: &mut Options| it.clocks = Some(ClockConfig::default().with_epoch(epoch))
+        };
+        assert_eq!(
+            configuration(with_clocks(1)).items(),
+            configuration(with_clocks(2)).items(),
+            "a computer's own time"
+        );
         assert_eq!(differing(|it, _| it.subdevices[1].optional = true), ["SubDevice 1: place or identity"]);
         assert_eq!(differing(|it, _| it.subdevices[2].pdos = Some(Vec::new())), ["SubDevice 2: process data"]);
         assert_eq!(differing(|it, _| it.domains[0].period *= 2), ["domains"]);

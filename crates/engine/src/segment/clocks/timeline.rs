@@ -163,7 +163,16 @@ impl Times {
         let Timeline { number, jumped, .. } = self.timeline;
         let (number, jumped) = (number.wrapping_add(1), jumped.wrapping_add(jump));
         (self.left_ns, self.unsaid) = (left.max(0).unsigned_abs(), Some(self.compared));
-        self.timeline = Timeline { number, jumped, shift, left, slid: self.slid, epoch };
+        self.timeline = Timeline { number, jumped, shift, left, slid: self.slid, epoch, is_adopted: false };
+        self.timeline
+    }
+
+    /// The system time goes on as another MainDevice has set it; the shift was read. `epoch` is the system time at host
+    /// time zero.
+    pub fn adopt(&mut self, shift: u64, epoch: u64) -> Timeline {
+        self.turn(0, (shift, 0), epoch);
+        self.unsaid = None;
+        self.timeline.is_adopted = true;
         self.timeline
     }
 }

@@ -27,14 +27,14 @@ impl Segment {
             is_same &= is_delay_known && (node.delay_ns - i64::from(read.delay_ns)).abs() <= SAME_NS;
         }
         self.note_running_signals();
-        let own = self.clocks.epoch;
+        let own = self.board.clocks.times.first_epoch().unwrap_or(self.clocks.config.epoch);
         self.clocks.epoch = time.wrapping_sub(sent_at.0);
         let delays = if is_same { Delays::Valid } else { Delays::Doubtful(now) };
         self.clocks.life = Life::Running(Running { delays, ..Running::default() });
         self.words.before.begin(&self.board);
         self.clocks.times.follow_no_first();
         let shift = own.wrapping_sub(self.clocks.epoch);
-        let timeline = self.clocks.times.turn(0, (shift, 0), self.clocks.epoch);
+        let timeline = self.clocks.times.adopt(shift, self.clocks.epoch);
         self.board.clocks.times.post_timeline(timeline);
         self.board.clocks.post_references(self.clocks.references());
         self.report_reference(effects);
