@@ -54,7 +54,8 @@ impl fmt::Display for ClientError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             ClientError::NoDaemon { socket, cause } => {
-                write!(f, "no daemon answers at {}: {cause}; does ringcatd run?", socket.display())
+                write!(f, "no daemon answers at {}: {cause}; does ringcatd run? Start it with ", socket.display())?;
+                f.write_str("'ethercatctl start' or 'systemctl start ethercat'")
             }
             ClientError::NotPermitted { socket, cause } => write!(
                 f,

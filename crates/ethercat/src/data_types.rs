@@ -194,8 +194,12 @@ impl DataType {
                 let sign = if value < 0 { self.sign_bit() } else { 0 };
                 (magnitude < self.sign_bit()).then_some(magnitude | sign)?
             }
-            Kind::Float if self.bytes == 4 => u64::from(text.trim().parse::<f32>().ok()?.to_bits()),
-            Kind::Float => text.trim().parse::<f64>().ok()?.to_bits(),
+            // A value behind the largest one would be written as infinity.
+            Kind::Float if self.bytes == 4 => {
+                let value = text.trim().parse::<f32>().ok().filter(|value| value.is_finite())?;
+                u64::from(value.to_bits())
+            }
+            Kind::Float => text.trim().parse::<f64>().ok().filter(|value| value.is_finite())?.to_bits(),
         };
         Some(bits.to_le_bytes()[..self.bytes].to_vec())
     }
@@ -333,6 +337,9 @@ mod tests {
         assert_eq!((read("int24", "-1"), read("int24", "0x800000")), (Some(vec![255; 3]), None));
         assert_eq!((read("sm16", "-5"), read("sm16", "32768")), (Some(vec![5, 0x80]), None));
         assert_eq!((read("bool", "1"), read("bool", "2"), read("bool", "")), (Some(vec![1]), None, None));
+        for (name, text) in [("float", "1e39"), ("double", "1e309"), ("float", "nan"), ("double", "inf")] {
+            assert_eq!(read(name, text), None, "{name} {text}");
+        }
         assert_eq!(read("float", "1.5"), Some(1.5_f32.to_le_bytes().to_vec()));
         assert_eq!((read("string", "ab"), read("raw", "0x01 2")), (Some(b"ab".to_vec()), Some(vec![1, 2])));
         assert!(named("int9").is_err());

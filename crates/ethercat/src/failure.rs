@@ -71,6 +71,9 @@ impl Failure {
             Failure::Usage(text) => format!("{text}\n"),
             Failure::Message(text) => text.clone(),
             Failure::Closed => String::new(),
+            Failure::Asked(error @ ClientError::NoDaemon { .. }) => {
+                format!("{error}; --main INTERFACE and --sim FILE do without it.\n")
+            }
             Failure::Asked(error) => format!("{error}\n"),
         }
     }

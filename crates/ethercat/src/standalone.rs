@@ -37,7 +37,8 @@ const PREOP: u16 = 2;
 /// Beginning of the event of a scan that failed.
 const FAILED_SCAN: &str = "scan failed";
 /// Where no frame returns there is no scan.
-const NO_SLAVE: &str = "no slave answers: is the cable plugged in at its input, and does it have power?";
+const NO_SLAVE: &str = "no slave answers: is the cable plugged in at its input, and does it have power? A ring needs \
+                        its second interface too: --redundant";
 /// The master that the daemon drives.
 const MASTER: u32 = 0;
 
@@ -81,6 +82,9 @@ pub fn links(arguments: &Arguments) -> Result<Option<String>, String> {
         (None, None, None) => Ok(None),
         (.., Some(file)) if file.is_empty() => Err("option --sim needs the name of a file".to_owned()),
         (Some(main), None, None) => Ok(Some(main.clone())),
+        (Some(main), Some(redundant), None) if main == redundant => {
+            Err("options --main and --redundant name the same interface".to_owned())
+        }
         (Some(main), Some(redundant), None) => Ok(Some(format!("{main},{redundant}"))),
         (None, None, Some(file)) => Ok(Some(format!("sim:{file}"))),
         (None, Some(_), _) => Err("option --redundant needs --main".to_owned()),

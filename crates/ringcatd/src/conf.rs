@@ -14,6 +14,9 @@ use std::path::Path;
 
 pub use model::{Conf, ConfError, Mistake, Own, Understood};
 
+use crate::segment_process::load;
+use crate::source::{MasterOption, Source};
+
 /// Longest file that is read.
 const LONGEST: u64 = 64 * 1024;
 
@@ -27,6 +30,24 @@ impl Conf {
         let whole = |text: String| failed(vec![Mistake { line: None, text }]);
         let bytes = bytes(path).map_err(whole)?;
         Conf::from_bytes(&bytes).map_err(failed)
+    }
+
+    /// Reads a file, and the files of simulated segments that it names.
+    ///
+    /// # Errors
+    /// As for [`Conf::read`], and segments that cannot be simulated.
+    pub fn read_with_segments(path: &Path) -> Result<Conf, ConfError> {
+        let conf = Conf::read(path)?;
+        let mistakes: Vec<Mistake> = conf.masters.iter().filter_map(|option| conf.mistake_of_segment(option)).collect();
+        if mistakes.is_empty() { Ok(conf) } else { Err(ConfError { path: path.to_owned(), mistakes }) }
+    }
+
+    fn mistake_of_segment(&self, option: &MasterOption) -> Option<Mistake> {
+        let Source::Simulated(file) = &option.source else { return None };
+        let error = load(file).err()?;
+        let name = format!("RINGCAT_MASTER{}_SIM", option.master);
+        let line = self.understood.iter().rev().find(|it| it.name == name).map(|it| it.line);
+        Some(Mistake { line, text: format!("{name}: {error}") })
     }
 
     /// The same from the bytes of a file.
@@ -80,6 +101,11 @@ mod tests {
         assert!(lines[2].starts_with(":4: MASTER0_BACKUP: ff:ff:ff:ff:ff:ff stands for"), "{shown}");
         std::fs::write(&path, "#".repeat(LONGEST as usize + 1)).expect("it can be written");
         assert!(Conf::read(&path).expect_err("too long").to_string().ends_with(": expected a file of at most 64 KiB"));
+        std::fs::write(&path, "\nRINGCAT_MASTER0_SIM=/no/such.toml\n").expect("it can be written");
+        assert!(Conf::read(&path).is_ok());
+        let shown = Conf::read_with_segments(&path).expect_err("no segment").to_string();
+        assert!(shown.starts_with(&format!("{}:2: RINGCAT_MASTER0_SIM: /no/such.toml: ", path.display())), "{shown}");
+        assert_eq!(shown.matches("/no/such.toml").count(), 1, "{shown}");
         std::fs::remove_file(&path).expect("it is there");
         assert!(Conf::read(&path).expect_err("it is gone").to_string().contains("No such file"));
         for endless in ["/dev/zero", "/"] {

@@ -83,7 +83,8 @@ fn is_called(name: &str) -> bool {
 }
 
 fn run(arguments: Arguments) -> Result<(), String> {
-    let conf = arguments.conf.as_deref().map(Conf::read).transpose().map_err(|error| error.to_string())?;
+    let conf =
+        arguments.conf.as_deref().map(Conf::read_with_segments).transpose().map_err(|error| error.to_string())?;
     running::run(&Setup::new(arguments.options, conf.unwrap_or_default())?)
 }
 
@@ -102,7 +103,12 @@ fn look(arguments: Arguments) -> Result<(), String> {
             Some(named)
         }
     };
-    let conf = file.as_deref().map(Conf::read).transpose().map_err(|error| error.to_string())?.unwrap_or_default();
+    let conf = file
+        .as_deref()
+        .map(Conf::read_with_segments)
+        .transpose()
+        .map_err(|error| error.to_string())?
+        .unwrap_or_default();
     let setup = Setup::new(arguments.options, conf.clone())?;
     let socket = match &setup.socket {
         Some(path) => path.display().to_string(),

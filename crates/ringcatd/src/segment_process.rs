@@ -99,9 +99,14 @@ pub fn run(file: &Path) -> Result<(), String> {
     }
 }
 
-fn load(file: &Path) -> Result<Network, String> {
+/// Loads the segment of a file.
+///
+/// # Errors
+/// What is wrong, with the name of the file.
+pub fn load(file: &Path) -> Result<Network, String> {
     let named = |error: String| format!("{}: {error}", file.display());
-    let segment = load_segment(file).map_err(|error| named(error.to_string()))?;
+    // These errors name the file themselves.
+    let segment = load_segment(file).map_err(|error| error.to_string())?;
     if segment.devices.is_empty() {
         return Err(named("the segment has no [[device]]".to_owned()));
     }

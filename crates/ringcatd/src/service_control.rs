@@ -78,7 +78,9 @@ pub fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<ExitCode, String> {
     let place = Place::find();
     let is_of_manager = place.is_systemd() && arguments.conf.is_none();
-    let conf = arguments.conf.clone().unwrap_or(place.path);
+    // The daemon is started in another directory.
+    let conf =
+        std::path::absolute(arguments.conf.as_ref().unwrap_or(&place.path)).map_err(|error| error.to_string())?;
     match arguments.verb {
         Verb::Check => check(arguments.conf.as_deref()),
         Verb::Status => status(&conf),
@@ -89,7 +91,7 @@ fn run(arguments: &Arguments) -> Result<ExitCode, String> {
         Verb::Stop => stop(&conf),
         Verb::Restart => {
             // With a wrong configuration the daemon that runs goes on.
-            Conf::read(&conf).map_err(|error| error.to_string())?;
+            Conf::read_with_segments(&conf).map_err(|error| error.to_string())?;
             stop(&conf)?;
             start(&conf)
         }
@@ -208,7 +210,7 @@ fn start(conf: &Path) -> Result<ExitCode, String> {
         say(&format!("ringcatd runs already (process {pid}){of_another_version}"))?;
         return Ok(ExitCode::SUCCESS);
     }
-    Conf::read(conf).map_err(|error| error.to_string())?;
+    Conf::read_with_segments(conf).map_err(|error| error.to_string())?;
     let failed = |error: std::io::Error| format!("ringcatd: {error}");
     let name = format!("ringcat-ethercatctl-{}", std::process::id());
     let address = SocketAddr::from_abstract_name(&name).map_err(failed)?;

@@ -45,7 +45,7 @@ impl fmt::Display for MailboxError {
             MailboxError::Bus(error) => error.fmt(f),
             MailboxError::NotPermitted(denied) => denied.fmt(f),
             MailboxError::Closed => {
-                f.write_str("the mailbox is not in use: the SubDevice is in INIT or does not answer")
+                f.write_str("the mailbox is not in use: the SubDevice has none, is in INIT or does not answer")
             }
             MailboxError::TooLong { bytes, limit } => {
                 write!(f, "message of {bytes} bytes, the mailbox takes {limit}")

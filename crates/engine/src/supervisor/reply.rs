@@ -116,7 +116,13 @@ impl fmt::Display for BusError {
             }
             BusError::Wkc { target: to, expected, got } => {
                 target(f, *to)?;
-                write!(f, ": expected working counter {expected}, got {got}")
+                write!(f, ": expected working counter {expected}, got {got}")?;
+                match (to, got) {
+                    (Target::Position(..) | Target::Station(..), Wkc(0)) => {
+                        f.write_str(": the SubDevice does not answer, or has no such register")
+                    }
+                    _ => Ok(()),
+                }
             }
             BusError::Busy { target: to } => {
                 target(f, *to)?;

@@ -169,7 +169,8 @@ fn a_working_counter_of_0_is_an_error_that_names_station_and_register() {
     let error = result.borrow().clone().unwrap().unwrap_err();
     assert_eq!(
         alloc::string::ToString::to_string(&error),
-        "station 0x1001, register 0x0130: expected working counter 1, got 0"
+        "station 0x1001, register 0x0130: expected working counter 1, got 0: the SubDevice does not answer, or has no \
+         such register"
     );
 }
 

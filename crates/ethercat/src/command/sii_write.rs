@@ -19,9 +19,10 @@ pub const COMMAND: Command = Command {
     summary: "Write SII contents to a slave.",
     forms: &["<FILENAME>"],
     help: "One slave must be selected. FILENAME is a file with the whole SII, '-' the
-standard input. It is checked: size, also against that of the EEPROM, checksum,
-categories up to their end; --force writes anyway what may make the slave
-unusable. The slave uses the new contents from its next start on.
+standard input. It is checked: size, checksum, categories up to their end;
+vendor, product, type of the PDI and size of the EEPROM against its present
+contents. --force writes anyway what may make the slave unusable. The slave
+uses the new contents from its next start on.
 ",
     options: super::reg_read::SINGLE,
     output: Output::Nothing,
@@ -40,9 +41,20 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     }
     let (master, position) = session.single_slave()?;
     let transfer = Transfer { master, position, work: TransferWork::SiiWrite };
-    session.ask_with_bar(transfer, Query::Tool(ToolQuery::SiiWrite { position, force }), image)?;
+    let written = session.ask_with_bar(transfer, Query::Tool(ToolQuery::SiiWrite { position, force }), image);
+    written.map_err(|failure| if force { failure } else { or_force(failure) })?;
     session.say_if_verbose("SII writing finished.");
     Ok(())
+}
+
+/// What speaks against an image does not prevent that it is written anyway.
+fn or_force(failure: Failure) -> Failure {
+    match failure {
+        Failure::Asked(error) if error.to_string().contains(": SII: ") || error.to_string().contains(": SII ") => {
+            Failure::failed(format!("{error}. Use --force to write anyway."))
+        }
+        other => other,
+    }
 }
 
 fn check(image: &[u8]) -> Result<(), Failure> {

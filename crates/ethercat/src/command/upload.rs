@@ -1,6 +1,7 @@
 //! `upload`: reads an object.
 
 use ringcat_control::message::Query;
+use ringcat_control::refusal::ServiceFault;
 use ringcat_control::tool::{ToolAnswer, ToolQuery, TransferWork};
 
 use crate::aborts::of_sdo;
@@ -79,6 +80,11 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     session.write_value(&data_type.show(&value)?)
 }
 
+/// Whether the SubDevice has answered, but does not describe the entry.
+fn is_of_dictionary(failure: &Failure) -> bool {
+    matches!(failure.fault(), Some(ServiceFault::Aborted(_) | ServiceFault::Other))
+}
+
 /// The index of an object.
 pub(super) fn sdo_index(text: &str) -> Result<u16, Failure> {
     numbers::parse(text).ok_or_else(|| Failure::usage(format!("Invalid SDO index '{text}'!")))
@@ -98,8 +104,8 @@ pub(super) fn data_type(
     let asked = session.tool(master, ToolQuery::Entry { position, index, sub_index });
     let entry = match asked {
         Ok(ToolAnswer::Entry(entry)) => entry,
-        // The dictionary does not describe the object; other failures are those of the daemon.
-        Err(failure) if failure.fault().is_none() => return Err(failure),
+        // The dictionary does not describe the object. Other failures have other reasons.
+        Err(failure) if !is_of_dictionary(&failure) => return Err(failure),
         _ => return Err(Failure::failed("Failed to determine SDO entry data type. Please specify --type.")),
     };
     data_types::coded(entry.data_type).ok_or_else(|| {

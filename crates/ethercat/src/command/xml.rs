@@ -29,7 +29,7 @@ output is well-formed UTF-8 whatever names hold.
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let master = session.single_master()?;
     let slaves = session.slaves(master)?;
-    let is_list = slaves.len() > 1;
+    let is_list = slaves.len() != 1;
     let mut text = "<?xml version=\"1.0\" ?>\n".to_owned();
     if is_list {
         text += "<EtherCATInfoList>\n";

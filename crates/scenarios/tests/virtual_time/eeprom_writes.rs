@@ -10,7 +10,7 @@ use ringcat_sim::fault::{Fault, SpoiltWrite};
 use ringcat_sim::network::NetworkOptions;
 use ringcat_wire::address::Position;
 use ringcat_wire::register::map;
-use ringcat_wire::sii::SiiError;
+use ringcat_wire::sii::{SiiError, checksum};
 use scenarios::segments::{descriptions, line};
 use scenarios::world::{CYCLE, World};
 
@@ -83,6 +83,33 @@ fn an_invalid_eeprom_image_is_refused_unless_forced() {
     assert!(write(&mut world, &before, false).is_ok());
     let reload = world.application_mut().engine_mut().start_sii_reload(SubDeviceId(DEVICE.0));
     assert_eq!(world.finish(LIMIT, reload), Ok(()));
+}
+
+// covers: eeprom
+#[test]
+fn the_image_of_another_device_is_refused_unless_forced_or_the_eeprom_is_erased() {
+    let mut world = world(3);
+    let before = image(&world);
+    let changed = |at: usize, value: &[u8]| {
+        let mut other = before.clone();
+        other[at..at + value.len()].copy_from_slice(value);
+        other[14] = checksum(other.first_chunk().expect("it is long"));
+        other
+    };
+    let refused = |world: &mut World, image: &[u8]| write(world, image, false).expect_err("of another device");
+    let error = refused(&mut world, &changed(0x14, &[0xEF, 0xBE]));
+    assert!(matches!(error, SiiProgramError::OtherProduct { present: [_, here], image: [_, there] } if here != there));
+    let nobody = changed(0x10, &[0xFF; 8]);
+    assert!(matches!(refused(&mut world, &nobody), SiiProgramError::OtherProduct { image: [u32::MAX, u32::MAX], .. }));
+    let pdi = changed(0, &[before[0] ^ 0x0D]);
+    assert!(matches!(refused(&mut world, &pdi), SiiProgramError::OtherPdi { .. }));
+    let size = changed(0x7C, &[0xFF, 0xFF]);
+    assert!(matches!(refused(&mut world, &size), SiiProgramError::OtherSize { image: 0x1_0000, .. }));
+    assert_eq!(image(&world), before, "nothing was written");
+    // What an erased EEPROM contains says nothing about the device.
+    assert!(write(&mut world, &nobody, true).is_ok());
+    assert!(write(&mut world, &pdi, false).is_ok());
+    assert_eq!(image(&world), pdi);
 }
 
 // covers: eeprom

@@ -16,7 +16,7 @@ use ringcat_wire::sii::{CHECKSUM_DISABLED, Sii, SiiError, checksum};
 
 use super::eeprom::Eeprom;
 use super::pace::Pace;
-use super::{MAX_WORDS, SiiReadError, claim};
+use super::{IDENTITY_WORD, MAX_WORDS, SiiReadError, claim};
 use crate::supervisor::long_transfers::{TransferKind, UnderWayTransfer};
 use crate::supervisor::{Bus, BusError};
 
@@ -94,6 +94,28 @@ pub enum SiiProgramError {
         /// Words of the EEPROM.
         there: usize,
     },
+    /// The image is that of another product than the device's present content.
+    OtherProduct {
+        /// Vendor and product of the present content.
+        present: [u32; 2],
+        /// Those of the image.
+        image: [u32; 2],
+    },
+    /// The image has another type of PDI (word 0, lower byte) than the present content: the device's processor would
+    /// no longer reach the controller.
+    OtherPdi {
+        /// Type in the present content.
+        present: u8,
+        /// Type in the image.
+        image: u8,
+    },
+    /// The image states another size of the EEPROM (word 0x3E) than the present content.
+    OtherSize {
+        /// KiBit in the present content.
+        present: u32,
+        /// KiBit in the image.
+        image: u32,
+    },
     /// The present configuration area has a wrong checksum.
     Checksum {
         /// The checksum computed from it.
@@ -136,6 +158,19 @@ impl fmt::Display for SiiProgramError {
                     f,
                     "SII: the image has {words} words, the EEPROM says in word {SIZE_WORD:#04x} that it has {there}"
                 )
+            }
+            SiiProgramError::OtherProduct { present: [vendor, product], image: [other_vendor, other_product] } => {
+                write!(
+                    f,
+                    "SII: the image is of vendor {other_vendor:#010x}, product {other_product:#010x}, the device of \
+                 {vendor:#010x}, {product:#010x}"
+                )
+            }
+            SiiProgramError::OtherPdi { present, image } => {
+                write!(f, "SII: the image has PDI type {image:#04x} in word 0, the device has {present:#04x}")
+            }
+            SiiProgramError::OtherSize { present, image } => {
+                write!(f, "SII: the image states an EEPROM of {image} KiBit in word 0x3e, the device one of {present}")
             }
             SiiProgramError::Checksum { expected, got } => {
                 write!(f, "the EEPROM has a wrong checksum: expected {expected:#04x}, word 7 is {got:#06x}")
@@ -199,7 +234,7 @@ pub fn check(image: &[u8], force: bool) -> Result<(), SiiProgramError> {
 }
 
 /// Writes an image; see [`check`]. One that is longer than the EEPROM states as its size needs `force`: what fits would
-/// be written, and the rest would fail.
+/// be written, and the rest would fail. So does the image of another device, if the present content is sound.
 pub async fn write(
     bus: &Bus,
     station: StationAddress,
@@ -211,15 +246,49 @@ pub async fn write(
     let under_way = bus.begin_transfer(station, TransferKind::EepromWrite, Some(image.len() as u64));
     let access = Access::begin(bus, station).await?;
     let work = async {
-        let there = if force { words.len() } else { access.size().await? as usize };
-        if words.len() > there {
-            return Err(SiiProgramError::TooLong { words: words.len(), there });
+        if !force {
+            let present = access.read(0, SIZE_WORD + 1).await?;
+            let present: Vec<u16> = present.as_chunks::<2>().0.iter().map(|pair| u16::from_le_bytes(*pair)).collect();
+            fits(&words, &present)?;
         }
         access.write_words(&words, &under_way).await
     };
     let written = work.await;
     access.end().await?;
     written
+}
+
+/// Whether an image is for the device with this present content, the words up to that of the size. An EEPROM that was
+/// never written, or has another checksum, says nothing about the device.
+fn fits(image: &[u16], present: &[u16]) -> Result<(), SiiProgramError> {
+    let size = |words: &[u16]| words.get(SIZE_WORD as usize).map_or(0, |word| u32::from(*word) + 1);
+    let there = (size(present) * KIBIT) as usize;
+    if image.len() > there {
+        return Err(SiiProgramError::TooLong { words: image.len(), there });
+    }
+    let is_sound = [u16::from(checksum_of(present)), CHECKSUM_DISABLED].contains(&present[CHECKSUM_WORD]);
+    let product_of = |words: &[u16]| {
+        let at = |word: usize| words.get(word).copied().unwrap_or_default();
+        [0, 2].map(|field| {
+            let first = IDENTITY_WORD as usize + field;
+            u32::from(at(first)) | u32::from(at(first + 1)) << 16
+        })
+    };
+    let product = product_of(present);
+    if !is_sound || product[0] == 0 || product[0] == u32::MAX {
+        return Ok(());
+    }
+    let (pdi, image_pdi) = (present[0] as u8, image[0] as u8);
+    if product_of(image) != product {
+        return Err(SiiProgramError::OtherProduct { present: product, image: product_of(image) });
+    }
+    if image_pdi != pdi {
+        return Err(SiiProgramError::OtherPdi { present: pdi, image: image_pdi });
+    }
+    if size(image) != size(present) {
+        return Err(SiiProgramError::OtherSize { present: size(present), image: size(image) });
+    }
+    Ok(())
 }
 
 /// Writes the alias and the new checksum of the configuration area. A checksum that is wrong before is corrected only
