@@ -56,7 +56,11 @@ const CHECKS: [Check; 15] = [
     Check("foe_write -p1 W", InBoot, |bench, _| bench.tool(&["foe_read", "-p1", FIRMWARE]).bytes == firmware()),
     Check("ip -p4 addr 10.0.0.V", Anywhere, |_, _| true),
     Check("debug 1", Anywhere, |bench, _| bench.good(&["debug", "0"]).is_empty()),
-    Check("rescan", Anywhere, |bench, _| bench.good(&["slaves"]).matches("  +  ").count() >= 4),
+    Check("rescan", Anywhere, |bench, _| {
+        // On a busy machine frames are lost now and then: a slave without an answer is shown until the next one.
+        bench.wait_until("all answer", || bench.good(&["slaves"]).matches("  +  ").count() >= 4);
+        true
+    }),
     Check("crc reset", Anywhere, |bench, _| bench.good(&["crc"]).lines().count() >= 7),
     Check("eoe", Anywhere, |bench, _| bench.good(&["eoe", "--json"]).contains("\"interfaces\":[]")),
     Check("xml -p1", Anywhere, |bench, _| {
