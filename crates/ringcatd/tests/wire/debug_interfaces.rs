@@ -6,9 +6,12 @@ use std::process::Command;
 use ringcat::AlState;
 
 use crate::bench::{Bench, LINE, RING, ip};
+use crate::c_program::CProgram;
 
 const MAIN: &str = "ecdbgm0";
 const BACKUP: &str = "ecdbgb0";
+/// Three with process data, so that each cycle of an application changes working counters.
+const OUTPUTS: &str = "[segment]\n[[device]]\ntype = \"digital-output-8\"\ncount = 3\n";
 
 /// Whether an interface is there.
 fn is_there(bench: &Bench, name: &str) -> bool {
@@ -141,4 +144,41 @@ fn a_line_has_one_debug_interface_and_a_daemon_without_permission_has_none() {
     bench.client();
     bench.wait_for_line("master 0: no debug interface: not permitted to make the network interface ecdbgm0");
     assert!(!is_there(&bench, MAIN));
+}
+
+/// On a line each frame is seen twice: as it is sent, and as it comes back.
+fn check_both_directions(what: &str, sent: u32, received: u32) {
+    // Half a second begins and ends while a frame is under way, and a busy machine shows some frames late.
+    assert!(sent > 25 && sent.abs_diff(received) <= sent / 10 + 2, "{what}: {sent} sent, {received} received");
+}
+
+// covers: daemon, capture, c-interface
+#[test]
+fn a_debug_interface_shows_both_directions_beside_a_c_program_and_behind_it() {
+    let Some(mut bench) = Bench::make(OUTPUTS, &[0]) else { return };
+    bench.start_segment("0");
+    let daemon = bench.start_daemon(&["--master", "0=near0", "--debug-if"]);
+    bench.wait_for(AlState::PreOp);
+    set_up(&bench, MAIN);
+    let is_idle = |bench: &Bench| {
+        let seen = listen(bench, MAIN);
+        seen.sent_acyclic > 0 && seen.received_acyclic > 0 && seen.sent_cyclic + seen.received_cyclic + seen.others == 0
+    };
+    bench.wait_until("the daemon before it", || is_idle(&bench));
+    let Some(program) = CProgram::start(&bench) else { return };
+    bench.wait_for(AlState::Op);
+    let seen = listen(&bench, MAIN);
+    println!("beside a C program: {seen:?}");
+    check_both_directions("cyclic frames of a C program", seen.sent_cyclic, seen.received_cyclic);
+    assert!(seen.sent_acyclic > 0 && seen.received_acyclic > 0 && seen.others == 0, "{seen:?}");
+    program.end();
+    bench.wait_for(AlState::PreOp);
+    bench.wait_until("the daemon after it", || is_idle(&bench));
+    // A program that is killed gives nothing back itself.
+    let Some(program) = CProgram::start(&bench) else { return };
+    bench.wait_for(AlState::Op);
+    drop(program);
+    bench.wait_for(AlState::PreOp);
+    bench.wait_until("the daemon after a program that was killed", || is_idle(&bench));
+    bench.end_daemon(daemon);
 }

@@ -3,6 +3,7 @@
 //! The segment, the daemon and the applications are processes; the applications run as a user without privileges.
 
 mod bench;
+mod c_program;
 mod debug_interfaces;
 mod devices;
 mod ends;
