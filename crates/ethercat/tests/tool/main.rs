@@ -15,6 +15,7 @@ mod json;
 mod operation;
 mod outputs;
 mod real_bus;
+mod real_details;
 mod real_outputs;
 mod real_xml;
 mod record;

@@ -9,6 +9,7 @@ use ringcat::wire::sii::{
     SiiSyncManager, SiiWriter, SyncManagerKind,
 };
 
+use crate::real_details::{self, Details};
 use crate::real_xml;
 
 /// Commands with samples.
@@ -75,6 +76,7 @@ pub struct Shown {
     pub order: String,
     pub sync_managers: Vec<SyncManager>,
     objects: Vec<Object>,
+    pub details: Option<Details>,
 }
 
 /// A SyncManager with its PDOs.
@@ -115,7 +117,7 @@ fn quoted(line: &str) -> String {
 pub fn bus(command: Command, text: &str, directory: &Path) -> Segment {
     let mut shown = match command {
         Command::Slaves => slaves(text),
-        Command::Details => details(text),
+        Command::Details => real_details::slaves(text),
         Command::Pdos => pdos(text),
         Command::Sdos => vec![Shown { objects: objects(text), ..Shown::default() }],
         Command::Xml => real_xml::slaves(text),
@@ -138,6 +140,11 @@ pub fn bus(command: Command, text: &str, directory: &Path) -> Segment {
         segment.devices.clear();
         segment.cables.clear();
     }
+    for (device, details) in
+        segment.devices.iter_mut().zip(&shown).filter_map(|(it, one)| Some((it, one.details.as_ref()?)))
+    {
+        details.change_controller(device);
+    }
     for (device, one) in segment.devices.iter_mut().zip(shown).filter(|(_, one)| !one.objects.is_empty()) {
         device.objects = one.objects;
         let all = Dictionary::new(device);
@@ -159,26 +166,6 @@ fn slaves(text: &str) -> Vec<Shown> {
         Some(Shown { alias, name, ..Shown::default() })
     };
     text.lines().filter_map(row).collect()
-}
-
-fn details(text: &str) -> Vec<Shown> {
-    let mut all: Vec<Shown> = Vec::new();
-    for line in text.lines() {
-        if line.starts_with("=== ") {
-            all.push(Shown::default());
-        }
-        let (Some(own), Some((key, value))) = (all.last_mut(), line.trim().split_once(':')) else { continue };
-        match key {
-            "Alias" => own.alias = number(value) as u16,
-            "Vendor Id" => own.identity[0] = number(value),
-            "Product code" => own.identity[1] = number(value),
-            "Revision number" => own.identity[2] = number(value),
-            "Order number" => own.order = value.trim().to_owned(),
-            "Device name" => own.name = value.trim().to_owned(),
-            _ => {}
-        }
-    }
-    all
 }
 
 fn pdos(text: &str) -> Vec<Shown> {
@@ -262,10 +249,10 @@ fn objects(text: &str) -> Vec<Object> {
 
 /// Strings of an SII: each once, from number 1.
 #[derive(Default)]
-struct Strings(Vec<String>);
+pub struct Strings(Vec<String>);
 
 impl Strings {
-    fn number(&mut self, text: &str) -> u8 {
+    pub fn number(&mut self, text: &str) -> u8 {
         if text.is_empty() {
             return 0;
         }
@@ -321,6 +308,10 @@ fn image(own: &Shown) -> Vec<u8> {
         general.coe = CoeDetails(CoeDetails::SDO | CoeDetails::SDO_INFORMATION);
     }
     let mut strings = Strings::default();
+    if let Some(details) = &own.details {
+        details.change_header(&mut header);
+        details.change_general(&mut general, &mut strings);
+    }
     (general.name, general.order) = (strings.number(&own.name), strings.number(&own.order));
     let both = [(PdoDirection::Tx, false), (PdoDirection::Rx, true)];
     let pdos = both.map(|(direction, is_output)| (direction, described(own, is_output, &mut strings)));
@@ -330,9 +321,11 @@ fn image(own: &Shown) -> Vec<u8> {
     writer.strings(&texts).expect("it fits");
     writer.general(&general).expect("it fits");
     let mut managers: Vec<SiiSyncManager> = own.sync_managers.iter().map(manager).collect();
-    if !own.objects.is_empty() {
-        let mailbox = |start, control| SyncManager { start, length: 512, control, enable: 1, pdos: Vec::new() };
-        managers = [mailbox(0x1000, 0x26), mailbox(0x1200, 0x22)].iter().map(manager).collect();
+    let MailboxLayout { receive_offset, receive_size, send_offset, send_size } = header.standard_mailbox;
+    if receive_size != 0 {
+        let mailbox = |start, length, control| SyncManager { start, length, control, enable: 1, pdos: Vec::new() };
+        let both = [mailbox(receive_offset, receive_size, 0x26), mailbox(send_offset, send_size, 0x22)];
+        managers = both.iter().map(manager).collect();
     }
     writer.sync_managers(&managers).expect("it fits");
     for (direction, all) in &pdos {
