@@ -2,6 +2,7 @@
 //!
 //! Only the words of the fixed area and the categories of an extent are read. If another SubDevice with the same fixed
 //! area was read before, only the category headers are read. If others are being read, they share the rest.
+//! Nothing is shared with SubDevices without a vendor id.
 
 mod cache;
 mod contents;
@@ -57,7 +58,7 @@ pub(super) async fn read(
     let mut eeprom = Eeprom::open(bus, station, Pace::guess(cache.pace())).await?;
     let area = fixed_area(&mut eeprom, extent).await?;
     cache.teach(eeprom.pace.learnt());
-    if !cache.enabled {
+    if !cache.enabled || !SiiHeader::decode(&area).identity.names_a_type() {
         return categories(&mut eeprom, &area, extent, Data::Own).await.map(|(_, contents)| contents);
     }
     let mut own_chain = None;

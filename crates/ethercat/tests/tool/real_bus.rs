@@ -115,7 +115,7 @@ fn quoted(line: &str) -> String {
 
 /// The bus on which a command printed this.
 pub fn bus(command: Command, text: &str, directory: &Path) -> Segment {
-    let mut shown = match command {
+    let shown = match command {
         Command::Slaves => slaves(text),
         Command::Details => real_details::slaves(text),
         Command::Pdos => pdos(text),
@@ -124,11 +124,7 @@ pub fn bus(command: Command, text: &str, directory: &Path) -> Segment {
         Command::Graph | Command::Master | Command::Domains => Vec::new(),
     };
     let mut file = "[segment]\n".to_owned();
-    for (position, one) in (0..).zip(&mut shown) {
-        // A daemon that knows an identity keeps what it has read of its SII.
-        if one.identity == [0; 3] && !one.name.is_empty() {
-            one.identity = [0, position, 0];
-        }
+    for (position, one) in shown.iter().enumerate() {
         std::fs::write(directory.join(format!("{position}.bin")), image(one)).expect("it can be written");
         file += &format!("[[device]]\nsii = \"{position}.bin\"\n");
     }

@@ -9,6 +9,7 @@ use ringcat_sim::description::DeviceDescription;
 use ringcat_sim::fault::Fault;
 use ringcat_sim::network::{Beyond, DatagramLimit, Network, NetworkOptions};
 use ringcat_sim::time::SimTime;
+use ringcat_wire::sii::Identity;
 use scenarios::dice::Dice;
 use scenarios::segments::{describe, line, ring};
 use scenarios::tap::Tap;
@@ -124,4 +125,21 @@ fn names_of_two_lengths_move_no_word_of_the_other_ones() {
         let [alone, shared] = [false, true].map(|cache| from_sii(case.scan(case.network(), cache).expect("all there")));
         assert_eq!(shared, alone, "{longer:#b}");
     }
+}
+
+/// Names of one length: the headers of all categories are equal.
+const NAMES: [&str; 8] = ["valve", "valve", "drive", "light", "scale", "drive", "meter", "valve"];
+
+// covers: scan
+#[test]
+fn subdevices_without_a_vendor_have_the_names_of_their_own_siis() {
+    let description = |name: &&str| {
+        let mut description = describe("emulated-output-8", name);
+        description.identity = Identity::default();
+        description
+    };
+    let case = Case { descriptions: NAMES.iter().map(description).collect(), is_ring: false, limit: None };
+    let found = case.scan(case.network(), true).expect("all are there");
+    let names: Vec<String> = found.subdevices.iter().map(|info| info.name.clone()).collect();
+    assert_eq!(names, NAMES);
 }

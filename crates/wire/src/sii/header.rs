@@ -15,6 +15,13 @@ pub struct Identity {
     pub serial: u32,
 }
 
+impl Identity {
+    /// Whether it names a type of SubDevices: ETG assigns no vendor id 0, so SubDevices with it have nothing in common.
+    pub const fn names_a_type(&self) -> bool {
+        self.vendor_id != 0
+    }
+}
+
 /// Addresses and sizes of the mailboxes of a SubDevice. "Receive" and "send" are from the view of the SubDevice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct MailboxLayout {

@@ -229,7 +229,8 @@ impl ObjectDictionary {
         if self.compared().is_some_and(|known| known.borrow().indices == indices) {
             return;
         }
-        let dictionary = if MODULES.iter().any(|index| indices.contains(index)) {
+        let has_own = !identity.names_a_type() || MODULES.iter().any(|index| indices.contains(index));
+        let dictionary = if has_own {
             None
         } else {
             let Ok(version) = self.version(indices, limits).await else { return };
