@@ -93,7 +93,7 @@ mod tests {
 
     // covers: 7.4, standby
     #[test]
-    fn a_reference_of_another_host_is_left_alone_until_the_rest_is_known_then_kept_there() {
+    fn a_reference_of_another_host_is_left_alone_until_the_rest_is_known() {
         let mut behind = Behind::adopted();
         let written = steer(&mut behind, 0, &[7_000; 40]);
         assert_eq!(written[..16], [Steering::Free; 16]);
