@@ -6,6 +6,7 @@ mod alarm;
 mod clocks;
 mod collisions;
 mod ethernet;
+mod first_calls;
 mod following;
 mod hot_connect;
 mod library;
