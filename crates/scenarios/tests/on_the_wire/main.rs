@@ -11,6 +11,7 @@ mod cables;
 mod captures;
 mod clocks;
 mod clocks_in_a_ring;
+mod clocks_of_two;
 mod cuts_beside;
 mod deaths;
 #[path = "../../../cli/tests/program/documented.rs"]

@@ -20,7 +20,7 @@ const AUTOMATIC: [&str; 3] = ["--automatic", "--cycle", "5ms"];
 const TAKEN_OVER: &str = "taken over: 10 SubDevices go on as they are";
 pub const READY: &str = "the other MainDevice: ready";
 
-/// Two controllers at a simulated ring of 10.
+/// Two controllers at a simulated ring, of 10 unless a test has another one.
 pub struct Pair {
     /// The bench.
     pub bench: Bench,
@@ -36,9 +36,14 @@ impl Pair {
 
     /// The same with these options of both controllers.
     pub fn with_role(role: &[&str]) -> Option<Pair> {
+        Pair::at(&RING_OF_10.segment(), role)
+    }
+
+    /// The same at this ring.
+    pub fn at(ring: &str, role: &[&str]) -> Option<Pair> {
         let mut bench = Bench::new(2)?;
         bench.add_second_main_device();
-        bench.simulate(&RING_OF_10.segment(), true);
+        bench.simulate(ring, true);
         let role = role.iter().map(|word| (*word).to_owned()).collect();
         Some(Pair { bench, declared: AUTOMATIC.map(str::to_owned).to_vec(), role })
     }

@@ -1,4 +1,5 @@
-//! The first mailbox calls of a new ACTIVE: one in the cycle with which its role changes, and one from the next cycle on.
+//! The first mailbox calls of a new ACTIVE: right after the cycle with which its role changes, and from the next cycle
+//! on.
 
 use std::sync::mpsc::{Sender, channel};
 use std::time::Duration;
@@ -14,8 +15,8 @@ use super::ring_of_two;
 /// A servo.
 const WITH_MAILBOX: SubDeviceId = SubDeviceId(3);
 const IDENTITY: (u16, u8) = (0x1018, 1);
-/// The end of the error of a call that is refused.
-const NOT_IN_USE: &str = "the mailbox is not in use: the SubDevice is in INIT or does not answer";
+/// In the error of a call that is refused.
+const NOT_IN_USE: &str = "the mailbox is not in use";
 /// A call has ended after so many cycles.
 const PATIENCE: usize = 100;
 
@@ -46,7 +47,7 @@ fn call(application: &mut Application<HostLinks>, after: usize) -> (Ending, usiz
         application.cycle(|_| ());
         match pending.take() {
             Some(Ok(_)) => return (Ending::Answered, cycles),
-            Some(Err(error)) if error.to_string().ends_with(NOT_IN_USE) => return (Ending::Refused, cycles),
+            Some(Err(error)) if error.to_string().contains(NOT_IN_USE) => return (Ending::Refused, cycles),
             Some(Err(error)) => panic!("{error}"),
             None if !pending.is_running() => return (Ending::Cancelled, cycles),
             None => {}

@@ -12,7 +12,7 @@ use ringcat::{
 };
 
 use super::timed_links::{Sent, TimedLinks};
-use super::{Tried, said};
+use super::tried::{Tried, said};
 
 /// Period of the cycles.
 pub const CYCLE: Duration = Duration::from_millis(5);

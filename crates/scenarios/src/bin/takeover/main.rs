@@ -12,6 +12,7 @@
 mod controllers;
 mod simulator;
 mod timed_links;
+mod tried;
 
 use std::process::{Command, ExitCode};
 use std::time::Instant;
@@ -21,8 +22,7 @@ use scenarios::namespaces::Namespaces;
 
 use controllers::{CYCLE, Measured, TIME_OUT, play};
 use simulator::Simulator;
-
-type Tried<T> = Result<T, String>;
+use tried::{Tried, said};
 
 /// Most of the time to the first frame, and of the time to complete process data.
 const FIRST_FRAME_US: f64 = 30.0;
@@ -124,8 +124,4 @@ fn show(blocks: &[Measured]) -> bool {
 fn ip(arguments: &str) -> Tried<()> {
     let output = Command::new("ip").args(arguments.split(' ')).output().map_err(said)?;
     if output.status.success() { Ok(()) } else { Err(String::from_utf8_lossy(&output.stderr).trim().to_owned()) }
-}
-
-fn said(error: impl ToString) -> String {
-    error.to_string()
 }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use super::{Tried, said};
+use super::tried::{Tried, said};
 
 /// SubDevices: 6 with 800 bytes, 8 with 26 bytes, and 19 with one byte.
 const SEGMENT: &str = "[segment]\nring = true\n\
