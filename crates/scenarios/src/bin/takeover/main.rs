@@ -27,9 +27,9 @@ use tried::{Tried, said};
 /// Most of the time to the first frame, and of the time to complete process data.
 const FIRST_FRAME_US: f64 = 30.0;
 const ROUND_TRIPS: f64 = 2.0;
-/// Blocks, and takeovers of a block: 100 together.
-const BLOCKS: usize = 5;
-const TAKEOVERS: usize = 20;
+/// Blocks, and takeovers of a block; with `RINGCAT_FULL=1` 100 together.
+const FEW: [usize; 2] = [3, 10];
+const FULL: [usize; 2] = [5, 20];
 /// Least process data.
 const BYTES: usize = 5_000;
 /// Of this process and its children, so that builds on the same machine do not take their processors.
@@ -85,20 +85,22 @@ fn inside() -> Tried<bool> {
     unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICE) };
     let _simulator = Simulator::start()?;
     let begin = Instant::now();
-    let blocks: Vec<Measured> = (0..BLOCKS).map(|_| play(TAKEOVERS)).collect::<Tried<_>>()?;
+    let is_full = std::env::var_os("RINGCAT_FULL").is_some_and(|value| value == "1");
+    let [count, takeovers] = if is_full { FULL } else { FEW };
+    let blocks: Vec<Measured> = (0..count).map(|_| play(takeovers)).collect::<Tried<_>>()?;
     let bytes = blocks[0].bytes;
     if bytes < BYTES {
         return Err(format!("the ring has {bytes} bytes of process data, not {BYTES}"));
     }
-    let met = show(&blocks);
-    println!("  {} takeovers took {:.1} s", BLOCKS * TAKEOVERS, begin.elapsed().as_secs_f64());
+    let met = show(&blocks, takeovers);
+    println!("  {} takeovers took {:.1} s", count * takeovers, begin.elapsed().as_secs_f64());
     Ok(met)
 }
 
-fn show(blocks: &[Measured]) -> bool {
+fn show(blocks: &[Measured], takeovers: usize) -> bool {
     let mut figures = Figures::new(&format!(
         "takeover, {} SubDevices, {} bytes, cycle {CYCLE:?}, time-out {TIME_OUT} cycles, spinning receive, medians of \
-         {TAKEOVERS}",
+         {takeovers}",
         simulator::COUNT,
         blocks[0].bytes
     ));
