@@ -243,7 +243,7 @@ pub struct PortLine {
     pub kind: u8,
     /// Link, loop closed, signal.
     pub link: [bool; 3],
-    /// Position of the neighbour.
+    /// Position of the neighbour behind an open port with a link.
     pub neighbour: Option<u16>,
     /// Port of the neighbour.
     pub neighbour_port: u8,

@@ -17,6 +17,9 @@ use crate::shape::{Command, Output};
 const EBUS: u8 = 2;
 const MII: u8 = 3;
 
+/// Attributes of an edge at the place where a ring is broken.
+const BREAK: &str = "[label=\"LINK FAILURE\",style=\"dashed\",color=\"red\"]";
+
 /// What the graph shows besides the slaves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum More {
@@ -25,12 +28,20 @@ enum More {
     Errors,
 }
 
+const CLOCKS: &str = "DC";
+const ERRORS: &str = "CRC";
+/// What can be added to the graph.
+pub const INFO: [&str; 2] = [CLOCKS, ERRORS];
+
 /// The command.
 pub const COMMAND: Command = Command {
     name: "graph",
     summary: "Output the bus topology as a graph.",
     forms: &["", "<INFO>"],
     help: "The output is in DOT: pipe it into 'dot -Tsvg'.
+
+Of a broken ring the second part hangs on the backup link, and the break is
+marked 'LINK FAILURE'.
 
 INFO adds to the graph: 'DC' clocks and delays, 'CRC' error counters.
 ",
@@ -42,8 +53,8 @@ INFO adds to the graph: 'DC' clocks and delays, 'CRC' error counters.
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let more = match session.words() {
         [] => More::Nothing,
-        [word] if word == "DC" => More::Clocks,
-        [word] if word == "CRC" => More::Errors,
+        [word] if word == CLOCKS => More::Clocks,
+        [word] if word == ERRORS => More::Errors,
         [word, ..] => return Err(Failure::usage(format!("Unknown argument \"{word}\"!"))),
     };
     let master = session.single_master()?;
@@ -79,10 +90,7 @@ strict graph bus {
 "
     .to_owned();
     let of = |position: u16| ports.iter().find(|line| line.position == position).cloned().unwrap_or_default();
-    if let Some(first) = slaves.first() {
-        let medium = of(first.line.position).ports[0].kind;
-        append!(text, "    master -- slave{}[label=\"{}\"]\n", first.line.position, medium_name(medium));
-    }
+    text += &masters_edges(slaves, &of);
     text += "\n";
     for (at, slave) in slaves.iter().enumerate() {
         let (position, own) = (slave.line.position, of(slave.line.position));
@@ -100,6 +108,32 @@ strict graph bus {
         text += "\n";
     }
     text + "}\n"
+}
+
+/// The edges between master and slaves, and where a ring is broken.
+fn masters_edges(slaves: &[Slave], of: &dyn Fn(u16) -> PortsLine) -> String {
+    let mut text = String::new();
+    let Some(first) = slaves.first().map(|slave| &slave.line) else { return text };
+    if first.is_redundant {
+        append!(text, "    master -- slave{} {BREAK}\n", first.position);
+    } else {
+        let medium = of(first.position).ports[0].kind;
+        append!(text, "    master -- slave{}[label=\"{}\"]\n", first.position, medium_name(medium));
+    }
+    for pair in slaves.windows(2) {
+        let [near, far] = [&pair[0].line, &pair[1].line];
+        if near.is_redundant != far.is_redundant {
+            append!(text, "    slave{} -- slave{} {BREAK}\n", near.position, far.position);
+        }
+    }
+    let behind = slaves.iter().rfind(|slave| slave.line.is_redundant);
+    let Some(last) = behind.map(|slave| slave.line.position) else { return text };
+    let ports = of(last).ports;
+    let port = ports.iter().enumerate().rfind(|(_, port)| port.is_host && port.link[0]);
+    let (head, medium) =
+        port.map_or((String::new(), ""), |(at, port)| (format!(",headlabel=\"{at}\""), medium_name(port.kind)));
+    append!(text, "    master -- slave{last} [taillabel=\"Backup\"{head},label=\"{medium}\"]\n");
+    text
 }
 
 /// The edge to a neighbour behind a port; empty if there is none.
@@ -178,5 +212,23 @@ mod tests {
         let text = graph(&slaves, &ports, &[], More::Errors);
         assert!(text.contains("taillabel=\"1 [1/2]\",headlabel=\"0 [1/2]\""), "{text}");
         assert!(graph(&[], &[], &[], More::Nothing).ends_with("Master\"]\n\n}\n"));
+    }
+
+    // covers: daemon
+    #[test]
+    fn parts_of_a_broken_ring_hang_on_their_links_and_the_break_is_marked() {
+        let edges = |redundant: [bool; 3]| {
+            let line = |(position, is_redundant)| SubDeviceLine { position, is_redundant, ..SubDeviceLine::default() };
+            let slaves = counted((0..).zip(redundant).map(line).collect());
+            let host = PortLine { kind: MII, link: [true, false, true], is_host: true, ..PortLine::default() };
+            let ports = [PortLine::default(), host, PortLine::default(), PortLine::default()];
+            masters_edges(&slaves, &|position| PortsLine { position, delay_ns: 0, ports })
+        };
+        let failure = "[label=\"LINK FAILURE\",style=\"dashed\",color=\"red\"]\n";
+        let backup = "    master -- slave2 [taillabel=\"Backup\",headlabel=\"1\",label=\"MII\"]\n";
+        let main = "    master -- slave0[label=\"\"]\n";
+        assert_eq!(edges([false, false, true]), format!("{main}    slave1 -- slave2 {failure}{backup}"));
+        assert_eq!(edges([true; 3]), format!("    master -- slave0 {failure}{backup}"));
+        assert_eq!(edges([false; 3]), main);
     }
 }

@@ -99,7 +99,7 @@ pub struct Port {
     pub loop_closed: bool,
     /// Whether it receives a signal
     pub signal: bool,
-    /// Position of the SubDevice at the other end; null where there is none
+    /// Position of the SubDevice behind an open port with a link; null where there is none
     pub neighbour: Option<u16>,
     /// Receive time by the local clock, in nanoseconds; null without a link, and where none is measured
     pub received_ns: Option<u32>,

@@ -123,7 +123,7 @@ pub struct CountedPort {
     pub forwarded_errors: u8,
     /// Lost links: registers 0x0310 and following
     pub lost_links: u8,
-    /// Position of the SubDevice at the other end; null where there is none
+    /// Position of the SubDevice behind an open port with a link; null where there is none
     pub neighbour: Option<u16>,
 }
 

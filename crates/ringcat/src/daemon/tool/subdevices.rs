@@ -157,8 +157,10 @@ fn port_kind(kind: PortKind) -> u8 {
 
 fn port(port: &PortReport) -> PortLine {
     let registers = port.registers.unwrap_or_default();
+    let is_open = registers.link && !registers.loop_closed;
+    // The ends of a broken cable may have lost another SubDevice between them.
     let neighbour = match port.neighbour {
-        Some(Neighbour::SubDevice(end)) => Some((end.position().0, end.port())),
+        Some(Neighbour::SubDevice(end)) if is_open => Some((end.position().0, end.port())),
         _ => None,
     };
     PortLine {
