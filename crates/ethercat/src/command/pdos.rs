@@ -12,6 +12,11 @@ use crate::selection::Slave;
 use crate::session::Session;
 use crate::shape::{Command, Output};
 
+const PLAIN: &str = "default";
+const MATLAB: &str = "etherlab";
+/// Forms of the output.
+pub const SKINS: [&str; 2] = [PLAIN, MATLAB];
+
 /// The command.
 pub const COMMAND: Command = Command {
     name: "pdos",
@@ -30,8 +35,8 @@ their entries. Skin 'etherlab' prints a MATLAB function instead.
 
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let is_matlab = match session.arguments.skin.as_deref() {
-        None | Some("default") => false,
-        Some("etherlab") => true,
+        None | Some(PLAIN) => false,
+        Some(MATLAB) => true,
         Some(other) => return Err(Failure::usage(format!("Invalid skin '{other}'!"))),
     };
     if is_matlab && session.arguments.json {

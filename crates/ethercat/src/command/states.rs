@@ -9,6 +9,9 @@ use crate::selection_help::SELECTION;
 use crate::session::Session;
 use crate::shape::{Command, Output};
 
+/// Names of the states, and their numbers in AL control.
+pub const STATES: [(&str, u8); 5] = [("INIT", 1), ("PREOP", 2), ("BOOT", 3), ("SAFEOP", 4), ("OP", 8)];
+
 /// The command.
 pub const COMMAND: Command = Command {
     name: "states",
@@ -25,14 +28,8 @@ brings them to it after its end.
 
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let [text] = session.words() else { return Err(Failure::usage("'states' takes one argument: the state!")) };
-    let state = match text.to_uppercase().as_str() {
-        "INIT" => 1,
-        "PREOP" => 2,
-        "BOOT" => 3,
-        "SAFEOP" => 4,
-        "OP" => 8,
-        _ => return Err(Failure::usage(format!("Invalid state '{text}'!"))),
-    };
+    let found = STATES.into_iter().find(|(name, _)| name.eq_ignore_ascii_case(text));
+    let (_, state) = found.ok_or_else(|| Failure::usage(format!("Invalid state '{text}'!")))?;
     let mut failed = Vec::new();
     for master in session.masters()? {
         for slave in session.listed_slaves(master.master)? {
