@@ -74,8 +74,41 @@ impl Failure {
             Failure::Asked(error @ ClientError::NoDaemon { .. }) => {
                 format!("{error}; --main INTERFACE and --sim FILE do without it.\n")
             }
+            // The SubDevice has failed, not the daemon.
+            Failure::Asked(ClientError::Refused(refusal @ (Refusal::Service { .. } | Refusal::Failed(_)))) => {
+                format!("{refusal}\n")
+            }
             Failure::Asked(error) => format!("{error}\n"),
         }
+    }
+}
+
+/// What has failed of several SubDevices: a command goes on with the others.
+#[derive(Debug, Default)]
+pub struct Failures(Vec<String>);
+
+impl Failures {
+    /// Keeps a failure of the SubDevice at a position, if it is one.
+    ///
+    /// # Errors
+    /// It is not the SubDevice that has failed: the others would fail too.
+    pub fn keep(&mut self, master: u32, position: u16, done: Result<(), Failure>) -> Result<(), Failure> {
+        match done {
+            Err(failure) if failure.not_driven().is_some() => Err(failure),
+            Err(Failure::Asked(ClientError::Refused(refusal))) => {
+                self.0.push(format!("Master {master}, slave {position}: {refusal}"));
+                Ok(())
+            }
+            other => other,
+        }
+    }
+
+    /// All that has failed.
+    ///
+    /// # Errors
+    /// Something has.
+    pub fn all(self) -> Result<(), Failure> {
+        if self.0.is_empty() { Ok(()) } else { Err(Failure::failed(self.0.join("\n"))) }
     }
 }
 

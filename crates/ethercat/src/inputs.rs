@@ -14,16 +14,16 @@ pub fn read(name: &str, limit: usize) -> Result<Vec<u8>, Failure> {
         return all(&mut io::stdin().lock(), "the standard input", limit);
     }
     let mut file = File::open(name).map_err(|error| Failure::failed(format!("Failed to open '{name}'! ({error})")))?;
-    all(&mut file, name, limit)
+    all(&mut file, &format!("'{name}'"), limit)
 }
 
 fn all(source: &mut dyn Read, name: &str, limit: usize) -> Result<Vec<u8>, Failure> {
     let mut bytes = Vec::new();
     let most = limit as u64 + 1;
     let read = source.take(most).read_to_end(&mut bytes);
-    read.map_err(|error| Failure::failed(format!("Failed to read '{name}': {error}")))?;
+    read.map_err(|error| Failure::failed(format!("Failed to read {name}: {error}")))?;
     if bytes.len() > limit {
-        return Err(Failure::failed(format!("'{name}' is longer than {limit} bytes!")));
+        return Err(Failure::failed(format!("{name} is longer than {limit} bytes!")));
     }
     Ok(bytes)
 }

@@ -2,7 +2,7 @@
 
 use ringcat_control::tool::ToolQuery;
 
-use crate::failure::Failure;
+use crate::failure::{Failure, Failures};
 use crate::numbers;
 use crate::selection_help::SELECTION;
 use crate::session::Session;
@@ -37,9 +37,11 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         let text = format!("This will write the alias addresses of {} slaves to {alias}!", slaves.len());
         return Err(Failure::failed(text + " Please specify --force to proceed."));
     }
+    let mut failures = Failures::default();
     for slave in slaves {
         let position = slave.line.position;
-        session.done(master, ToolQuery::AliasWrite { position, alias, force }, Vec::new())?;
+        let done = session.done(master, ToolQuery::AliasWrite { position, alias, force }, Vec::new());
+        failures.keep(master, position, done.map(drop))?;
     }
-    Ok(())
+    failures.all()
 }

@@ -4,7 +4,7 @@ use ringcat_control::message::Query;
 use ringcat_control::tool::{MOST_SUBDEVICES, Piece, PortLine, PortsLine, ToolAnswer, ToolQuery};
 
 use crate::append::append;
-use crate::failure::{Failure, unexpected};
+use crate::failure::{Failure, Failures, unexpected};
 use crate::json;
 use crate::json::slaves::Crc;
 use crate::selection::Slave;
@@ -48,11 +48,14 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let master = session.single_master()?;
     let slaves = session.all_slaves(master)?;
     if is_reset {
+        let mut failures = Failures::default();
         for slave in slaves {
-            let ask = Query::RegisterWrite { position: slave.line.position, address: COUNTERS };
-            session.ask(master, ask, vec![0; COUNTER_BYTES])?;
+            let position = slave.line.position;
+            let ask = Query::RegisterWrite { position, address: COUNTERS };
+            let done = session.ask(master, ask, vec![0; COUNTER_BYTES]);
+            failures.keep(master, position, done.map(drop))?;
         }
-        return Ok(());
+        return failures.all();
     }
     let ports = ports(session, master)?;
     if session.arguments.json {

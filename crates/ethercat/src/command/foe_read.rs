@@ -1,6 +1,7 @@
 //! `foe_read`: reads a file by FoE.
 
-use std::fs;
+use std::fs::File;
+use std::io::{self, Write};
 
 use ringcat_control::message::Query;
 use ringcat_control::tool::{ToolQuery, TransferWork};
@@ -8,7 +9,7 @@ use ringcat_control::tool::{ToolQuery, TransferWork};
 use crate::aborts::of_foe;
 use crate::failure::Failure;
 use crate::json;
-use crate::json::reads::File;
+use crate::json::reads;
 use crate::json::values::Hex;
 use crate::progress::Transfer;
 use crate::session::Session;
@@ -42,13 +43,14 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     session.say_if_verbose(&format!("Read {} bytes of FoE data.", bytes.len()));
     let local = session.arguments.output_file.clone().filter(|file| file != "-");
     if let Some(local) = &local {
-        let written = fs::write(local, &bytes);
-        written.map_err(|error| Failure::failed(format!("Failed to open '{local}'! ({error})")))?;
+        let failed = |what: &str, error: io::Error| Failure::failed(format!("Failed to {what} '{local}'! ({error})"));
+        let mut file = File::create(local).map_err(|error| failed("open", error))?;
+        file.write_all(&bytes).map_err(|error| failed("write", error))?;
     }
     match local {
         _ if session.arguments.json => {
             let data = local.is_none().then_some(Hex(&bytes));
-            json::print(session, &File { master, position, file: &file, length_bytes: bytes.len(), data })
+            json::print(session, &reads::File { master, position, file: &file, length_bytes: bytes.len(), data })
         }
         Some(_) => Ok(()),
         None => session.write(&bytes),

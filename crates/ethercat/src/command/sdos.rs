@@ -5,7 +5,7 @@ use ringcat_wire::sii::MailboxProtocols;
 
 use super::slaves::description;
 use crate::data_types;
-use crate::failure::{Failure, unexpected};
+use crate::failure::{Failure, Failures, unexpected};
 use crate::json;
 use crate::json::sdos::Sdos;
 use crate::session::Session;
@@ -39,6 +39,7 @@ only the objects. Slaves without SDO information have no lines.
 fn run(session: &mut Session<'_>) -> Result<(), Failure> {
     let masters = session.masters()?;
     let is_several = masters.len() > 1;
+    let mut failures = Failures::default();
     for master in masters {
         let number = master.master;
         let slaves = session.listed_slaves(number)?;
@@ -46,16 +47,19 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
         for slave in slaves {
             let position = slave.line.position;
             if session.arguments.json {
-                print_json(session, number, position)?;
+                let printed = print_json(session, number, position);
+                failures.keep(number, position, printed)?;
                 continue;
             }
             if has_header {
                 writeln!(session, "=== Master {number}, Slave {position} ===")?;
             }
-            for_each(session, number, position, &mut |session, index, object| text(session, index, &object))?;
+            let listed =
+                for_each(session, number, position, &mut |session, index, object| text(session, index, &object));
+            failures.keep(number, position, listed)?;
         }
     }
-    Ok(())
+    failures.all()
 }
 
 /// What is done with an object and its index.

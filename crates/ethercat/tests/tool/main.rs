@@ -9,6 +9,7 @@ mod dot;
 mod events;
 mod golden;
 mod golden_bus;
+mod gone;
 mod hostile;
 mod idle;
 mod json;
