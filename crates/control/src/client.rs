@@ -62,10 +62,23 @@ impl fmt::Display for ClientError {
                 "this user may not connect to {}: {cause}; --mode and --group of ringcatd decide which users may",
                 socket.display()
             ),
-            ClientError::Connection(error) => write!(f, "connection to ringcatd: {error}"),
+            ClientError::Connection(error) => write!(f, "connection to ringcatd: {error}{}", hint(error)),
             ClientError::Refused(refusal) => write!(f, "ringcatd: {refusal}"),
             ClientError::Ended => f.write_str("the wait for ringcatd was ended"),
         }
+    }
+}
+
+/// What to do after a failure of a connection.
+fn hint(error: &ReceiveError) -> &'static str {
+    match error {
+        ReceiveError::Ended => {
+            "; the daemon has ended: 'ethercatctl status' shows whether it runs, 'ethercatctl start' starts it"
+        }
+        ReceiveError::TimedOut => {
+            "; the daemon does not answer: 'ethercatctl status' shows its state, 'ethercatctl restart' restarts it"
+        }
+        ReceiveError::Wire(_) | ReceiveError::Io(_) => "",
     }
 }
 
@@ -242,6 +255,20 @@ mod tests {
     use std::os::unix::net::UnixListener;
 
     use super::*;
+
+    // covers: daemon
+    #[test]
+    fn a_daemon_that_has_ended_or_does_not_answer_is_named_with_what_to_do() {
+        let said = |kind: io::ErrorKind| ClientError::from(io::Error::from(kind)).to_string();
+        let ended = said(io::ErrorKind::BrokenPipe);
+        assert!(ended.contains("the daemon has ended: ") && ended.contains("'ethercatctl start'"), "{ended}");
+        assert_eq!([said(io::ErrorKind::ConnectionReset), said(io::ErrorKind::UnexpectedEof)], [&*ended, &*ended]);
+        let silent = said(io::ErrorKind::TimedOut);
+        assert!(
+            silent.contains("the daemon does not answer: ") && silent.contains("'ethercatctl restart'"),
+            "{silent}"
+        );
+    }
 
     /// A daemon that refuses this many questions before it answers one; the number of questions that it got.
     fn refusing(refusals: Vec<Refusal>) -> (PathBuf, std::thread::JoinHandle<usize>) {

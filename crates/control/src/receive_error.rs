@@ -44,7 +44,9 @@ impl From<io::Error> for ReceiveError {
     fn from(error: io::Error) -> ReceiveError {
         match error.kind() {
             io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut => ReceiveError::TimedOut,
-            io::ErrorKind::UnexpectedEof | io::ErrorKind::ConnectionReset => ReceiveError::Ended,
+            io::ErrorKind::UnexpectedEof | io::ErrorKind::ConnectionReset | io::ErrorKind::BrokenPipe => {
+                ReceiveError::Ended
+            }
             _ => ReceiveError::Io(error),
         }
     }

@@ -6,6 +6,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use ringcat_control::client::ClientError;
 use ringcat_control::message::{Answer, MasterState, Query, Snapshot};
 use ringcat_control::socket::to_connect_to;
 use ringcat_control::tool::{MOST_SUBDEVICES, Piece, SubDeviceLine, ToolAnswer, ToolQuery};
@@ -237,6 +238,8 @@ impl<'a> Session<'a> {
         match asked {
             Ok((Answer::Masters(masters), _)) => Ok(order::by_key(masters, |master| master.master)),
             Ok(_) => Err(unexpected()),
+            // It was there before.
+            Err(Failure::Asked(error @ ClientError::Connection(_))) => Err(Failure::Asked(error)),
             Err(Failure::Asked(error)) => Err(failed(error.to_string())),
             Err(other) => Err(other),
         }
