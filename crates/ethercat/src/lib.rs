@@ -95,6 +95,10 @@ fn try_run(words: &[OsString], socket: &Path, output: &mut dyn Write, errors: &m
         let failure = Failure::usage(format!("'{}' {why}: it has no --json!", command.name));
         return Err(failure.with_help(|| help::of(command)));
     }
+    if command.forms == [""] && arguments.words.len() > 1 {
+        let failure = Failure::usage(format!("'{}' takes no arguments!", command.name));
+        return Err(failure.with_help(|| help::of(command)));
+    }
     let links = standalone::links(&arguments).map_err(wrong)?;
     let mut session = Session::new(command.name, arguments, socket, output, errors).with_links(links);
     (command.run)(&mut session).map_err(|failure| failure.with_help(|| help::of(command)))

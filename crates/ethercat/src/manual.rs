@@ -44,6 +44,11 @@ fn as_it_is(text: &str) -> String {
     format!(".nf\n{}\n.fi\n", roff(text.trim_end()))
 }
 
+/// How numbers are written, in a section of its own: it is not about the last option.
+fn numbers() -> String {
+    format!(".SH NUMBERS\n{}", as_it_is(NUMBERS))
+}
+
 const END: &str = ".SH EXIT STATUS\n0, or 1 after a failure.\n.SH ENVIRONMENT\n.TP\n.B RINGCAT_SOCKET\n\
                    Socket of the daemon. By default that of a daemon of this user, or /run/ringcat/control.\n";
 
@@ -60,7 +65,7 @@ pub fn page(command: &Command) -> String {
     }
     text += &options("OPTIONS OF THIS COMMAND", &of(command));
     text += &options("OPTIONS OF ALL COMMANDS", &common());
-    text + &as_it_is(NUMBERS) + END + ".SH SEE ALSO\n.BR ethercat (8)\n"
+    text + &numbers() + END + ".SH SEE ALSO\n.BR ethercat (8)\n"
 }
 
 /// The page of the tool: `ethercat.8`.
@@ -71,7 +76,7 @@ pub fn overview() -> String {
     for command in ALL {
         let _ = write!(text, ".TP\n.BR ethercat\\-{} (8)\n{}\n", roff(command.name), roff(command.summary));
     }
-    text + &options("OPTIONS OF ALL COMMANDS", &common()) + &as_it_is(NUMBERS) + END
+    text + &options("OPTIONS OF ALL COMMANDS", &common()) + &numbers() + END
 }
 
 /// All pages by file name.
@@ -95,6 +100,7 @@ mod tests {
                         .iter()
                         .any(|known| line.split_whitespace().next() == Some(known))
             };
+            assert!(page.contains(".SH NUMBERS\n.nf\nNumbers are decimal"), "{name}: {page}");
             assert!(page.lines().all(is_known) && !page.lines().any(|line| line.starts_with('\'')), "{name}: {page}");
         }
     }
