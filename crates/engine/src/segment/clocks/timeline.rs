@@ -169,6 +169,7 @@ impl Times {
 
     /// The system time goes on as another MainDevice has set it; the shift was read. `epoch` is the system time at host
     /// time zero.
+    #[cfg(feature = "standby")]
     pub fn adopt(&mut self, shift: u64, epoch: u64) -> Timeline {
         self.turn(0, (shift, 0), epoch);
         self.unsaid = None;
