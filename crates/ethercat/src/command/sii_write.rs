@@ -1,5 +1,6 @@
 //! `sii_write`: writes an SII.
 
+use ringcat_control::client::ClientError;
 use ringcat_control::message::Query;
 use ringcat_control::tool::{ToolQuery, TransferWork};
 
@@ -50,7 +51,7 @@ fn run(session: &mut Session<'_>) -> Result<(), Failure> {
 /// What speaks against an image does not prevent that it is written anyway.
 fn or_force(failure: Failure) -> Failure {
     match failure {
-        Failure::Asked(error) if error.to_string().contains(": SII: ") || error.to_string().contains(": SII ") => {
+        Failure::Asked(error @ ClientError::Refused(_)) if error.to_string().contains("SII") => {
             Failure::failed(format!("{error}. Use --force to write anyway."))
         }
         other => other,

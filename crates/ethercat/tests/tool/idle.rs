@@ -148,6 +148,10 @@ fn siis_and_aliases_are_written_after_a_check() {
     std::fs::write(&file, &changed).expect("it can be written");
     assert_eq!(bench.good(&["sii_write", "-p1", &path]), "");
     assert_eq!(bench.tool(&["sii_read", "-p1"]).bytes, changed);
+    std::fs::write(&file, bench.tool(&["sii_read", "-p2"]).bytes).expect("it can be written");
+    let refused = bench.bad(&["sii_write", "-p1", &path]);
+    assert!(refused.contains("SII: the image is of vendor 0x"), "{refused}");
+    assert!(refused.ends_with(". Use --force to write anyway.\n"), "{refused}");
     let refused = bench.bad(&["alias", "1234"]);
     let wanted = "This will write the alias addresses of 4 slaves to 1234! Please specify --force to proceed.\n";
     assert_eq!(refused, wanted);
