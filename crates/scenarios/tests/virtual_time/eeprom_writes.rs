@@ -99,15 +99,15 @@ fn the_image_of_another_device_is_refused_unless_forced_or_the_eeprom_is_erased(
     let refused = |world: &mut World, image: &[u8]| write(world, image, false).expect_err("of another device");
     let error = refused(&mut world, &changed(0x14, &[0xEF, 0xBE]));
     assert!(matches!(error, SiiProgramError::OtherProduct { present: [_, here], image: [_, there] } if here != there));
-    let nobody = changed(0x10, &[0xFF; 8]);
-    assert!(matches!(refused(&mut world, &nobody), SiiProgramError::OtherProduct { image: [u32::MAX, u32::MAX], .. }));
+    let unnamed = changed(0x10, &[0xFF; 8]);
+    assert!(matches!(refused(&mut world, &unnamed), SiiProgramError::OtherProduct { image: [u32::MAX, u32::MAX], .. }));
     let pdi = changed(0, &[before[0] ^ 0x0D]);
     assert!(matches!(refused(&mut world, &pdi), SiiProgramError::OtherPdi { .. }));
     let size = changed(0x7C, &[0xFF, 0xFF]);
     assert!(matches!(refused(&mut world, &size), SiiProgramError::OtherSize { image: 0x1_0000, .. }));
     assert_eq!(image(&world), before, "nothing was written");
     // What an erased EEPROM contains says nothing about the device.
-    assert!(write(&mut world, &nobody, true).is_ok());
+    assert!(write(&mut world, &unnamed, true).is_ok());
     assert!(write(&mut world, &pdi, false).is_ok());
     assert_eq!(image(&world), pdi);
 }
