@@ -11,6 +11,7 @@ use ringcat::standby::RoleControl;
 use ringcat::standby::guard::Pulse;
 use ringcat::wire::frame::MacAddress;
 use ringcat::{Instant, Link, Links, MainDeviceRole, PerLink};
+use ringcat_link::interface;
 
 /// Shared by the threads that send heartbeats.
 #[derive(Debug, Default)]
@@ -41,9 +42,24 @@ pub enum Half {
 /// Links of one half.
 pub type HalfLinks = BeatingLinks<PacketLinks>;
 
+/// Interfaces that are switched off when this is dropped, also if the program panics.
+#[derive(Debug)]
+pub struct OffAtEnd(pub [String; 2]);
+
+impl Drop for OffAtEnd {
+    fn drop(&mut self) {
+        for name in &self.0 {
+            // Where it is not permitted, it was not permitted to begin either.
+            let _ = interface::switch(name, false);
+        }
+    }
+}
+
 /// Links whose waits send heartbeats.
 #[derive(Debug)]
 pub struct BeatingLinks<L> {
+    /// Dropped before the links: an interface that is on and does not forward takes the bus from the ACTIVE.
+    _off: Option<OffAtEnd>,
     links: L,
     half: Half,
     pulse: Option<Pulse>,
@@ -55,7 +71,13 @@ pub struct BeatingLinks<L> {
 impl<L: Links> BeatingLinks<L> {
     /// Links of a half, with a heartbeat at least once a period.
     pub fn new(links: L, half: Half, pulse: Option<Pulse>, period: Duration, beats: Arc<Beats>) -> BeatingLinks<L> {
-        BeatingLinks { links, half, pulse, period, beats }
+        BeatingLinks { _off: None, links, half, pulse, period, beats }
+    }
+
+    /// The same, and these interfaces are switched off before the links end.
+    #[must_use]
+    pub fn with_off_at_end(self, interfaces: [String; 2]) -> BeatingLinks<L> {
+        BeatingLinks { _off: Some(OffAtEnd(interfaces)), ..self }
     }
 
     /// Sends a heartbeat if one is due from this half. Returns the end of a wait that is to end at `until`.

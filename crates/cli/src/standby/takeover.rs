@@ -16,7 +16,7 @@ use ringcat::{
 };
 use ringcat_link::interface;
 
-use super::beating::{BeatingLinks, Beats, Half, HalfLinks};
+use super::beating::{BeatingLinks, Beats, Half, HalfLinks, OffAtEnd};
 use super::counters::{in_line, same_identity};
 use super::ethernet::Ethernet;
 use super::event_report::EventReport;
@@ -87,7 +87,9 @@ pub fn run(arguments: &StandbyArguments) -> Result<Report, Failure> {
     let beats = Arc::new(Beats::default());
     let main = cyclic.addresses().main;
     let beating = |links, half| BeatingLinks::new(links, half, guarded.pulse(), guarded.look(), beats.clone());
-    let (cyclic, acyclic) = (beating(cyclic, Half::Cyclic), beating(acyclic, Half::Acyclic));
+    let interfaces = [names.main.clone(), redundant.to_owned()];
+    let cyclic = beating(cyclic, Half::Cyclic).with_off_at_end(interfaces.clone());
+    let acyclic = beating(acyclic, Half::Acyclic);
     let _awake = thread.prepare_process();
     let standby = StandbyOptions::default().with_max_acyclic(arguments.ethernet.max_acyclic());
     let standby = standby.with_sizes(arguments.sizes.sizes());
@@ -100,7 +102,6 @@ pub fn run(arguments: &StandbyArguments) -> Result<Report, Failure> {
     let schedule = arguments.policy.switch_every.map(Schedule::new);
     // Nothing else sets it.
     let _ = beats.role.set(control.clone());
-    let interfaces = [names.main.clone(), redundant.to_owned()];
     let begin = now();
     let until = arguments.lasts.map_or(Instant::NEVER, |lasts| begin + lasts);
     let events = EventReport::new(begin);
@@ -135,7 +136,8 @@ impl Controller<'_> {
             names: self.events.names.clone(),
         };
         let ready = joiner.partner_ready.clone();
-        let _on = SwitchedOn::new(&self.interfaces)?;
+        let _off = OffAtEnd(self.interfaces.clone());
+        self.interfaces.iter().try_for_each(|name| interface::switch(name, true))?;
         let joining = joiner.start(cyclic)?;
         say!(
             "INACTIVE: forwarding between {} and {}, listening; Ctrl-C ends it",
@@ -349,25 +351,5 @@ impl Controller<'_> {
         let verdict = Verdict::of(reasons, format!("{end}, takeovers: {}", seen.takeovers));
         let data = Standby { takeover: Some(seen), ..standby.clone() };
         Report { verdict, data: Data::Standby(data) }
-    }
-}
-
-/// Interfaces that are on as long as this lives, also if the program panics.
-struct SwitchedOn([String; 2]);
-
-impl SwitchedOn {
-    fn new(interfaces: &[String; 2]) -> Result<SwitchedOn, Failure> {
-        let on = SwitchedOn(interfaces.clone());
-        interfaces.iter().try_for_each(|name| interface::switch(name, true))?;
-        Ok(on)
-    }
-}
-
-impl Drop for SwitchedOn {
-    fn drop(&mut self) {
-        for name in &self.0 {
-            // Where it is not permitted, it was not permitted to begin either.
-            let _ = interface::switch(name, false);
-        }
     }
 }
